@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from core.record import Record, column
 
 
-class Mesh(Record):
+class Mesh(Record, kw_only=True):
     """Polygons with per-corner UVs.
 
     points : (V, 3) float32, metres, object space, at rest.

@@ -1,0 +1,127 @@
+"""Normals and areas of triangles, vertices and polygons, as flat functions over arrays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from core.mesh.mesh import Mesh
+
+F32_2D = types.Array(types.float32, 2, "C", readonly=True)
+I32_1D = types.Array(types.int32, 1, "C", readonly=True)
+I32_2D = types.Array(types.int32, 2, "C", readonly=True)
+
+
+def face_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Unit normals (T, 3) float32 of `triangles` (T, 3) int32 over `points` (V, 3) float32.
+
+    Counter-clockwise corners seen from outside; a triangle without area gets a zero normal.
+    """
+    normals = np.empty((len(triangles), 3), np.float32)
+    areas = np.empty(len(triangles), np.float64)
+    _faces(points, triangles, normals, areas)
+    return normals
+
+
+def face_areas(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Areas (T,) float64, in the square of the unit of `points`."""
+    normals = np.empty((len(triangles), 3), np.float32)
+    areas = np.empty(len(triangles), np.float64)
+    _faces(points, triangles, normals, areas)
+    return areas
+
+
+def vertex_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Unit normals (V, 3) float32 of the vertices: faces weighted by their angle at the vertex.
+
+    Does not depend on how a flat region is triangulated (Thuermer and Wuethrich, "Computing Vertex Normals from
+    Polygonal Facets", 1998). A vertex without a face of some area gets a zero normal.
+    """
+    counts = np.full(len(triangles), 3, np.int32)
+    return _polygon_vertex_normals(points, counts, np.ascontiguousarray(triangles).reshape(-1))
+
+
+def mesh_normals(mesh: Mesh, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """Angle-weighted unit normals (V, 3) float32 of the vertices of a polygon mesh.
+
+    points : (V, 3) float32, deformed positions instead of those of the mesh at rest.
+    """
+    return _polygon_vertex_normals(mesh.points if points is None else points, mesh.counts, mesh.corners)
+
+
+def _polygon_vertex_normals(
+    points: NDArray[np.float32], counts: NDArray[np.int32], corners: NDArray[np.int32]
+) -> NDArray[np.float32]:
+    total = np.zeros((len(points), 3), np.float64)
+    _gather_polygons(points, counts, corners, total)
+    normals = np.empty((len(points), 3), np.float32)
+    _normalise(total, normals)
+    return normals
+
+
+@njit(types.void(F32_2D, I32_2D, types.float32[:, ::1], types.float64[::1]), cache=True, nogil=True)
+def _faces(points, triangles, normals, areas):  # type: ignore[no-untyped-def]
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ux = np.float64(points[b, 0]) - points[a, 0]
+        uy = np.float64(points[b, 1]) - points[a, 1]
+        uz = np.float64(points[b, 2]) - points[a, 2]
+        vx = np.float64(points[c, 0]) - points[a, 0]
+        vy = np.float64(points[c, 1]) - points[a, 1]
+        vz = np.float64(points[c, 2]) - points[a, 2]
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = math.sqrt(x * x + y * y + z * z)
+        areas[t] = 0.5 * length
+        scale = 1.0 / length if length > 0.0 else 0.0
+        normals[t, 0], normals[t, 1], normals[t, 2] = x * scale, y * scale, z * scale
+
+
+@njit(types.void(F32_2D, I32_1D, I32_1D, types.float64[:, ::1]), cache=True, nogil=True)
+def _gather_polygons(points, counts, corners, total):  # type: ignore[no-untyped-def]
+    """Add to every vertex the unit normal of each face around it times the angle of the face there."""
+    start = 0
+    for f in range(len(counts)):
+        n = counts[f]
+        # Newell's vector area, relative to the first corner so that far-away meshes lose no digits
+        o = corners[start]
+        ox, oy, oz = np.float64(points[o, 0]), np.float64(points[o, 1]), np.float64(points[o, 2])
+        x = y = z = 0.0
+        for k in range(1, n - 1):
+            a, b = corners[start + k], corners[start + k + 1]
+            ax, ay, az = points[a, 0] - ox, points[a, 1] - oy, points[a, 2] - oz
+            bx, by, bz = points[b, 0] - ox, points[b, 1] - oy, points[b, 2] - oz
+            x += ay * bz - az * by
+            y += az * bx - ax * bz
+            z += ax * by - ay * bx
+        length = math.sqrt(x * x + y * y + z * z)
+        if length > 0.0:
+            x, y, z = x / length, y / length, z / length
+            for k in range(n):
+                v = corners[start + k]
+                p = corners[start + (k - 1 if k > 0 else n - 1)]
+                q = corners[start + (k + 1 if k < n - 1 else 0)]
+                ax = np.float64(points[p, 0]) - points[v, 0]
+                ay = np.float64(points[p, 1]) - points[v, 1]
+                az = np.float64(points[p, 2]) - points[v, 2]
+                bx = np.float64(points[q, 0]) - points[v, 0]
+                by = np.float64(points[q, 1]) - points[v, 1]
+                bz = np.float64(points[q, 2]) - points[v, 2]
+                cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+                angle = math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), ax * bx + ay * by + az * bz)
+                total[v, 0] += angle * x
+                total[v, 1] += angle * y
+                total[v, 2] += angle * z
+        start += n
+
+
+@njit(types.void(types.float64[:, ::1], types.float32[:, ::1]), cache=True, nogil=True)
+def _normalise(total, normals):  # type: ignore[no-untyped-def]
+    for v in range(len(total)):
+        x, y, z = total[v, 0], total[v, 1], total[v, 2]
+        length = math.sqrt(x * x + y * y + z * z)
+        # 1e-9 of a radian: opposite faces that cancel leave no direction worth having
+        scale = 1.0 / length if length > 1e-9 else 0.0
+        normals[v, 0], normals[v, 1], normals[v, 2] = x * scale, y * scale, z * scale

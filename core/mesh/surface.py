@@ -1,0 +1,279 @@
+"""Roots on a skin: placing them, where they are on a deformed skin, and strands carried along with it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from core.mesh.mesh import Mesh, Triangles
+from core.mesh.normals import mesh_normals
+from core.mesh.roots import Roots
+
+F32_2D = types.Array(types.float32, 2, "C", readonly=True)
+F32_3D = types.Array(types.float32, 3, "C", readonly=True)
+I32_2D = types.Array(types.int32, 2, "C", readonly=True)
+
+
+def place_roots(
+    mesh: Mesh,
+    triangles: Triangles,
+    triangle_index: NDArray[np.int32],
+    barycentric: NDArray[np.float32],
+    normals: NDArray[np.float32] | None = None,
+) -> Roots:
+    """Bind N points, given on the triangulation, to the faces of the mesh.
+
+    Parameters
+    ----------
+    triangle_index : (N,) int32, rows of `triangles`, none negative.
+    barycentric : (N, 3) float32, weights of the triangle's corners.
+    normals : (V, 3) float32, the vertex normals of the mesh at rest, where the caller has them.
+
+    Returns
+    -------
+    Roots whose rest frames have the smooth interpolated normal, and as tangent the direction of growing U on the
+    skin; where there are no UVs (or they are degenerate) +X carried by the smallest rotation from +Y to the normal.
+    """
+    index = np.asarray(triangle_index, np.intp)
+    if len(index) and index.min() < 0:
+        raise ValueError("place_roots needs a triangle for every root; leave out the queries that found none")
+    mesh_corners = triangles.corners[index]
+    faces = triangles.faces[index]
+    weights = np.array(barycentric, np.float32).reshape(-1, 3)
+    vertices = np.ascontiguousarray(triangles.vertices[index])
+    corner_uvs = np.zeros((len(index), 6), np.float32)
+    if mesh.uvs is not None:
+        corner_uvs = np.ascontiguousarray(mesh.uvs[mesh_corners].reshape(-1, 6))
+    if normals is None:
+        normals = mesh_normals(mesh)
+    frames = np.empty((len(index), 3, 3), np.float32)
+    uvs = np.empty((len(index), 2), np.float32)
+    _rest_frames(mesh.points, normals, vertices, weights, corner_uvs, frames, uvs)
+    local = mesh_corners - mesh.starts[faces][:, None]
+    return Roots(faces=faces, corners=local.astype(np.int32), weights=weights, uvs=uvs, frames=frames)
+
+
+def root_vertices(mesh: Mesh, roots: Roots) -> NDArray[np.int32]:
+    """The three vertices (N, 3) int32 each root hangs on."""
+    return mesh.corners[mesh.starts[roots.faces][:, None] + roots.corners]
+
+
+def root_positions(mesh: Mesh, roots: Roots, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """Where the roots lie, (N, 3) float32, on the mesh at rest or at deformed `points` (V, 3) float32."""
+    out = np.empty((len(roots.faces), 3), np.float32)
+    _blend(mesh.points if points is None else points, root_vertices(mesh, roots), roots.weights, out)
+    return out
+
+
+def root_normals(mesh: Mesh, roots: Roots, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """Smooth unit normals at the roots, (N, 3) float32, at rest (the stored ones) or at deformed `points`."""
+    return np.ascontiguousarray(root_frames(mesh, roots, points)[:, 2])
+
+
+def root_frames(
+    mesh: Mesh,
+    roots: Roots,
+    points: NDArray[np.float32] | None = None,
+    normals: NDArray[np.float32] | None = None,
+) -> NDArray[np.float32]:
+    """Frames at the roots, (N, 3, 3) float32, rows tangent, bitangent, normal.
+
+    At rest these are the stored frames. At deformed `points` (V, 3) the normal is the deformed smooth normal and the
+    tangent is the stored one pushed forward by the root's triangle, so the frame follows the skin without UVs too.
+    A triangle that has collapsed turns the stored tangent by the smallest rotation between the two normals.
+
+    normals : (V, 3) float32, vertex normals at `points`, where the caller has them.
+    """
+    if points is None:
+        return roots.frames
+    if normals is None:
+        normals = mesh_normals(mesh, points)
+    out = np.empty((len(roots.faces), 3, 3), np.float32)
+    _deformed_frames(mesh.points, points, normals, root_vertices(mesh, roots), roots.weights, roots.frames, out)
+    return out
+
+
+def strands_on_deformed(
+    mesh: Mesh,
+    roots: Roots,
+    strand_points: NDArray[np.float32],
+    deformed_points: NDArray[np.float32],
+    normals: NDArray[np.float32] | None = None,
+) -> NDArray[np.float32]:
+    """Strands carried rigidly by their root frames: x' = x0' + F1^T F0 (x - x0), frames as rows.
+
+    Parameters
+    ----------
+    strand_points : (N, P, 3) float32, object space at rest.
+    deformed_points : (V, 3) float32, the deformed vertices.
+
+    Returns
+    -------
+    (N, P, 3) float32. A point equal to ``root_positions(mesh, roots)`` lands on
+    ``root_positions(mesh, roots, deformed_points)`` to the bit; lengths are kept to rounding.
+    """
+    rest = root_positions(mesh, roots)
+    moved = root_positions(mesh, roots, deformed_points)
+    frames = root_frames(mesh, roots, deformed_points, normals)
+    out = np.empty(strand_points.shape, np.float32)
+    _carry(np.ascontiguousarray(strand_points, np.float32), rest, moved, roots.frames, frames, out)
+    return out
+
+
+@njit(types.void(F32_2D, I32_2D, F32_2D, types.float32[:, ::1]), cache=True, nogil=True)
+def _blend(points, vertices, weights, out):  # type: ignore[no-untyped-def]
+    for i in range(len(vertices)):
+        for k in range(3):
+            total = 0.0
+            for j in range(3):
+                total += np.float64(weights[i, j]) * points[vertices[i, j], k]
+            out[i, k] = total
+
+
+@njit(cache=True, inline="always")
+def _minimal_turn(ax, ay, az, bx, by, bz, vx, vy, vz):  # type: ignore[no-untyped-def]
+    """Turn vector v by the smallest rotation that takes unit a to unit b (a half turn when they are opposite)."""
+    c = ax * bx + ay * by + az * bz
+    if c < -0.999999:
+        # half turn about any axis square to a
+        if abs(ax) < 0.6:
+            kx, ky, kz = 0.0, -az, ay
+        else:
+            kx, ky, kz = az, 0.0, -ax
+        s = 2.0 * (kx * vx + ky * vy + kz * vz) / (kx * kx + ky * ky + kz * kz)
+        return s * kx - vx, s * ky - vy, s * kz - vz
+    kx, ky, kz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    s = (kx * vx + ky * vy + kz * vz) / (1.0 + c)
+    return (
+        c * vx + ky * vz - kz * vy + s * kx,
+        c * vy + kz * vx - kx * vz + s * ky,
+        c * vz + kx * vy - ky * vx + s * kz,
+    )
+
+
+@njit(cache=True, inline="always")
+def _write_frame(out, i, tx, ty, tz, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Store tangent (made square to n), n x t and n; False, and nothing stored, when t has no part along the skin."""
+    before = tx * tx + ty * ty + tz * tz
+    d = tx * nx + ty * ny + tz * nz
+    tx, ty, tz = tx - d * nx, ty - d * ny, tz - d * nz
+    length = tx * tx + ty * ty + tz * tz
+    if not length > 1e-12 * before:
+        return False
+    length = 1.0 / math.sqrt(length)
+    tx, ty, tz = tx * length, ty * length, tz * length
+    out[i, 0, 0], out[i, 0, 1], out[i, 0, 2] = tx, ty, tz
+    out[i, 1, 0], out[i, 1, 1], out[i, 1, 2] = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    out[i, 2, 0], out[i, 2, 1], out[i, 2, 2] = nx, ny, nz
+    return True
+
+
+@njit(cache=True, inline="always")
+def _normal_at(points, normals, vertices, weights, i, fx, fy, fz):  # type: ignore[no-untyped-def]
+    """The smooth normal of root i; without one that of its triangle, without that the unit vector f."""
+    nx = ny = nz = 0.0
+    for j in range(3):
+        v, w = vertices[i, j], np.float64(weights[i, j])
+        nx += w * normals[v, 0]
+        ny += w * normals[v, 1]
+        nz += w * normals[v, 2]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length < 1e-6:
+        a, b, c = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        ux = np.float64(points[b, 0]) - points[a, 0]
+        uy = np.float64(points[b, 1]) - points[a, 1]
+        uz = np.float64(points[b, 2]) - points[a, 2]
+        vx = np.float64(points[c, 0]) - points[a, 0]
+        vy = np.float64(points[c, 1]) - points[a, 1]
+        vz = np.float64(points[c, 2]) - points[a, 2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        if length == 0.0:
+            return fx, fy, fz
+    return nx / length, ny / length, nz / length
+
+
+@njit(
+    types.void(F32_2D, F32_2D, I32_2D, F32_2D, F32_2D, types.float32[:, :, ::1], types.float32[:, ::1]),
+    cache=True, nogil=True,
+)
+def _rest_frames(points, normals, vertices, weights, corner_uvs, frames, uvs):  # type: ignore[no-untyped-def]
+    for i in range(len(vertices)):
+        nx, ny, nz = _normal_at(points, normals, vertices, weights, i, 0.0, 1.0, 0.0)
+        for k in range(2):
+            total = 0.0
+            for j in range(3):
+                total += np.float64(weights[i, j]) * corner_uvs[i, 2 * j + k]
+            uvs[i, k] = total
+        a, b, c = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        du1 = np.float64(corner_uvs[i, 2]) - corner_uvs[i, 0]
+        dv1 = np.float64(corner_uvs[i, 3]) - corner_uvs[i, 1]
+        du2 = np.float64(corner_uvs[i, 4]) - corner_uvs[i, 0]
+        dv2 = np.float64(corner_uvs[i, 5]) - corner_uvs[i, 1]
+        det = du1 * dv2 - du2 * dv1
+        done = False
+        if abs(det) > 1e-9 * (du1 * du1 + dv1 * dv1 + du2 * du2 + dv2 * dv2):
+            s1, s2 = dv2 / det, -dv1 / det
+            tx = s1 * (np.float64(points[b, 0]) - points[a, 0]) + s2 * (np.float64(points[c, 0]) - points[a, 0])
+            ty = s1 * (np.float64(points[b, 1]) - points[a, 1]) + s2 * (np.float64(points[c, 1]) - points[a, 1])
+            tz = s1 * (np.float64(points[b, 2]) - points[a, 2]) + s2 * (np.float64(points[c, 2]) - points[a, 2])
+            done = _write_frame(frames, i, tx, ty, tz, nx, ny, nz)
+        if not done:
+            tx, ty, tz = _minimal_turn(0.0, 1.0, 0.0, nx, ny, nz, 1.0, 0.0, 0.0)
+            _write_frame(frames, i, tx, ty, tz, nx, ny, nz)
+
+
+@njit(
+    types.void(F32_2D, F32_2D, F32_2D, I32_2D, F32_2D, F32_3D, types.float32[:, :, ::1]), cache=True, nogil=True
+)
+def _deformed_frames(rest, points, normals, vertices, weights, stored, frames):  # type: ignore[no-untyped-def]
+    for i in range(len(vertices)):
+        mx, my, mz = np.float64(stored[i, 2, 0]), np.float64(stored[i, 2, 1]), np.float64(stored[i, 2, 2])
+        px, py, pz = np.float64(stored[i, 0, 0]), np.float64(stored[i, 0, 1]), np.float64(stored[i, 0, 2])
+        nx, ny, nz = _normal_at(points, normals, vertices, weights, i, mx, my, mz)
+        a, b, c = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        ux = np.float64(rest[b, 0]) - rest[a, 0]
+        uy = np.float64(rest[b, 1]) - rest[a, 1]
+        uz = np.float64(rest[b, 2]) - rest[a, 2]
+        vx = np.float64(rest[c, 0]) - rest[a, 0]
+        vy = np.float64(rest[c, 1]) - rest[a, 1]
+        vz = np.float64(rest[c, 2]) - rest[a, 2]
+        # the stored tangent, dropped along its normal onto the rest triangle, in the triangle's two edges
+        cx, cy, cz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        area2 = cx * cx + cy * cy + cz * cz
+        facing = mx * cx + my * cy + mz * cz
+        done = False
+        if area2 > 0.0 and abs(facing) > 0.05 * math.sqrt(area2):
+            slide = (px * cx + py * cy + pz * cz) / facing
+            qx, qy, qz = px - slide * mx, py - slide * my, pz - slide * mz
+            # q = s u + r v within the plane: s = (q x v).c / c.c, r = (u x q).c / c.c
+            s = ((qy * vz - qz * vy) * cx + (qz * vx - qx * vz) * cy + (qx * vy - qy * vx) * cz) / area2
+            r = ((uy * qz - uz * qy) * cx + (uz * qx - ux * qz) * cy + (ux * qy - uy * qx) * cz) / area2
+            tx = s * (np.float64(points[b, 0]) - points[a, 0]) + r * (np.float64(points[c, 0]) - points[a, 0])
+            ty = s * (np.float64(points[b, 1]) - points[a, 1]) + r * (np.float64(points[c, 1]) - points[a, 1])
+            tz = s * (np.float64(points[b, 2]) - points[a, 2]) + r * (np.float64(points[c, 2]) - points[a, 2])
+            done = _write_frame(frames, i, tx, ty, tz, nx, ny, nz)
+        if not done:
+            tx, ty, tz = _minimal_turn(mx, my, mz, nx, ny, nz, px, py, pz)
+            _write_frame(frames, i, tx, ty, tz, nx, ny, nz)
+
+
+@njit(types.void(F32_3D, F32_2D, F32_2D, F32_3D, F32_3D, types.float32[:, :, ::1]), cache=True, nogil=True)
+def _carry(strands, rest, moved, frames_rest, frames_moved, out):  # type: ignore[no-untyped-def]
+    turn = np.empty((3, 3), np.float64)
+    for i in range(len(strands)):
+        for r in range(3):
+            for c in range(3):
+                total = 0.0
+                for k in range(3):
+                    total += np.float64(frames_moved[i, k, r]) * frames_rest[i, k, c]
+                turn[r, c] = total
+        for p in range(strands.shape[1]):
+            x = np.float64(strands[i, p, 0]) - rest[i, 0]
+            y = np.float64(strands[i, p, 1]) - rest[i, 1]
+            z = np.float64(strands[i, p, 2]) - rest[i, 2]
+            for r in range(3):
+                out[i, p, r] = moved[i, r] + (turn[r, 0] * x + turn[r, 1] * y + turn[r, 2] * z)
