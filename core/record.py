@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import msgspec
@@ -68,8 +69,38 @@ def column(record: Record, name: str, dtype: DTypeLike, shape: tuple[int | None,
     ):
         wanted = ", ".join("any" if s is None else str(s) for s in shape)
         raise ValueError(f"{label} must have shape ({wanted}), not {array.shape}")
-    if array.dtype.kind == "f" and not np.isfinite(np.sum(array, dtype=np.float64)):
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise ValueError(f"{label} holds values that are not finite numbers")
     frozen = freeze(array if is_frozen(array) else array.copy())
     if frozen is not getattr(record, name):
         msgspec.structs.force_setattr(record, name, frozen)
+
+
+def text(record: Record, *names: str, longest: int = 255) -> None:
+    """Check text fields of `record`: 1 to `longest` printable characters.
+
+    Raises
+    ------
+    ValueError
+        The message names the field.
+    """
+    for name in names:
+        value = getattr(record, name)
+        if not (isinstance(value, str) and 0 < len(value) <= longest and value.isprintable()):
+            raise ValueError(f"{type(record).__name__}.{name} must be 1 to {longest} printable characters")
+
+
+def number(record: Record, *names: str, least: float = -math.inf, most: float = math.inf) -> None:
+    """Check number fields (or tuples of numbers) of `record`: finite and within `least` .. `most`.
+
+    Raises
+    ------
+    ValueError
+        The message names the field and the limits.
+    """
+    for name in names:
+        value = getattr(record, name)
+        for v in value if isinstance(value, tuple) else (value,):
+            if not (isinstance(v, int | float) and math.isfinite(v) and least <= v <= most):
+                limits = f" from {least:g} to {most:g}" if math.isfinite(least) or math.isfinite(most) else ""
+                raise ValueError(f"{type(record).__name__}.{name} must be a finite number{limits}, not {v!r}")

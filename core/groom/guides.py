@@ -38,7 +38,8 @@ class Guides(Record):
         column(self, "frozen", np.bool_, (n,))
         if len(self.roots.faces) != n:
             raise ValueError(f"Guides.roots has {len(self.roots.faces)} rows for {n} guides")
-        if n and (self.next_id <= int(self.ids.max()) or len(np.unique(self.ids)) != n):
+        ids = self.ids if np.all(self.ids[1:] > self.ids[:-1]) else np.sort(self.ids)  # mostly sorted already
+        if n and (self.next_id <= int(ids[-1]) or np.any(ids[1:] == ids[:-1])):
             raise ValueError("Guides.ids must be unique and below next_id")
 
     def __len__(self) -> int:
