@@ -1,0 +1,210 @@
+"""A bounding volume hierarchy over triangles: closest points, rays and segments.
+
+Binary tree by binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies",
+2007); a node holds the boxes of its two children so that one read decides where to go. Boxes are float32, tests on
+triangles are float64. Inner functions (`closest_one`, `ray_one`, `any_hit_segment`) take plain arrays so that other
+kernels can call them; each needs a `stack` from `new_stack()`, made once per kernel call.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from core.mesh.bvh_build import build_tree, gather_corners, refit_boxes
+from core.mesh.bvh_kernels import any_hit_segment, closest_on_triangle, closest_one, new_stack, ray_one
+from core.workers import Workers, serial_ranges
+
+F32_2D = types.Array(types.float32, 2, "C", readonly=True)
+I32_1D = types.Array(types.int32, 1, "C", readonly=True)
+I32_2D = types.Array(types.int32, 2, "C", readonly=True)
+
+__all__ = [
+    "Bvh", "any_hit_segment", "build_bvh", "cast_rays", "closest_on_triangle", "closest_one", "closest_points",
+    "hit_segments", "new_stack", "ray_one", "refit",
+]
+
+
+class Bvh(NamedTuple):
+    """A hierarchy over T triangles, M nodes.
+
+    boxes : (M, 12) float32, low xyz and high xyz of the first child, then of the second.
+    children : (M, 2) int32, >= 0 another node, else ``~(first slot * 8 + count)`` of a leaf.
+    order : (T,) int32, the triangle in each slot.
+    corners : (T, 9) float32, the three points of the triangle in each slot.
+    triangles : (T, 3) int32, vertices of each triangle (as given).
+    """
+
+    boxes: NDArray[np.float32]
+    children: NDArray[np.int32]
+    order: NDArray[np.int32]
+    corners: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+
+
+def build_bvh(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> Bvh:
+    """Build over `triangles` (T, 3) int32 of `points` (V, 3) float32.
+
+    Degenerate triangles are kept (they are points or segments); those with a vertex that is not finite are never hit.
+    """
+    points = np.ascontiguousarray(points, np.float32)
+    triangles = np.ascontiguousarray(triangles, np.int32)
+    count = len(triangles)
+    order = np.arange(count, dtype=np.int32)
+    boxes = np.empty((max(1, count), 12), np.float32)
+    children = np.empty((max(1, count), 2), np.int32)
+    nodes = build_tree(points, triangles, order, boxes, children)
+    corners = np.empty((count, 9), np.float32)
+    gather_corners(points, triangles, order, corners)
+    return Bvh(boxes[:nodes].copy(), children[:nodes].copy(), order, corners, triangles)
+
+
+def refit(bvh: Bvh, points: NDArray[np.float32]) -> Bvh:
+    """The same tree around moved `points` (V, 3) float32: quick, and good while the skin keeps its general shape."""
+    corners = np.empty_like(bvh.corners)
+    gather_corners(np.ascontiguousarray(points, np.float32), bvh.triangles, bvh.order, corners)
+    boxes = np.empty_like(bvh.boxes)
+    refit_boxes(bvh.children, corners, boxes)
+    return bvh._replace(corners=corners, boxes=boxes)
+
+
+def closest_points(
+    bvh: Bvh, queries: NDArray[np.float32], max_distance: float = math.inf, workers: Workers | None = None
+) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
+    """The nearest point of the skin for each of `queries` (N, 3) float32.
+
+    Returns
+    -------
+    triangle : (N,) int32, -1 where nothing lies within `max_distance` (or the query is not finite).
+    barycentric : (N, 3) float32, weights of that triangle's corners (zeros where none).
+    distance : (N,) float32 (infinite where none).
+    """
+    queries = np.ascontiguousarray(queries, np.float32)
+    count = len(queries)
+    triangle = np.empty(count, np.int32)
+    barycentric = np.empty((count, 3), np.float32)
+    distance = np.empty(count, np.float32)
+
+    def rows(start: int, stop: int) -> None:
+        _closest_rows(
+            bvh.boxes, bvh.children, bvh.order, bvh.corners, queries, float(max_distance),
+            triangle, barycentric, distance, start, stop,
+        )
+
+    _ranges(workers)(count, rows)
+    return triangle, barycentric, distance
+
+
+def cast_rays(
+    bvh: Bvh,
+    origins: NDArray[np.float32],
+    directions: NDArray[np.float32],
+    max_distance: float = math.inf,
+    workers: Workers | None = None,
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32]]:
+    """The first triangle each ray meets, from either side.
+
+    Parameters
+    ----------
+    origins, directions : (N, 3) float32; directions need not be unit.
+    max_distance : in lengths of the direction, as is the distance returned.
+
+    Returns
+    -------
+    distance : (N,) float32, the hit is ``origin + distance * direction``; infinite where nothing is met.
+    triangle : (N,) int32, -1 where nothing is met.
+    barycentric : (N, 3) float32.
+    """
+    origins = np.ascontiguousarray(origins, np.float32)
+    directions = np.ascontiguousarray(directions, np.float32)
+    count = len(origins)
+    distance = np.empty(count, np.float32)
+    triangle = np.empty(count, np.int32)
+    barycentric = np.empty((count, 3), np.float32)
+
+    def rows(start: int, stop: int) -> None:
+        _ray_rows(
+            bvh.boxes, bvh.children, bvh.order, bvh.corners, origins, directions, float(max_distance),
+            distance, triangle, barycentric, start, stop,
+        )
+
+    _ranges(workers)(count, rows)
+    return distance, triangle, barycentric
+
+
+def hit_segments(
+    bvh: Bvh, starts: NDArray[np.float32], ends: NDArray[np.float32], workers: Workers | None = None
+) -> NDArray[np.bool_]:
+    """True (N,) where the segment from `starts` to `ends` (N, 3) float32 meets the skin, end points included."""
+    starts = np.ascontiguousarray(starts, np.float32)
+    ends = np.ascontiguousarray(ends, np.float32)
+    out = np.empty(len(starts), np.bool_)
+
+    def rows(start: int, stop: int) -> None:
+        _segment_rows(bvh.boxes, bvh.children, bvh.corners, starts, ends, out, start, stop)
+
+    _ranges(workers)(len(starts), rows)
+    return out
+
+
+def _ranges(workers: Workers | None) -> Callable[..., None]:
+    return serial_ranges if workers is None else workers.ranges
+
+
+@njit(
+    types.void(
+        F32_2D, I32_2D, I32_1D, F32_2D, F32_2D, types.float64,
+        types.int32[::1], types.float32[:, ::1], types.float32[::1], types.int64, types.int64,
+    ),
+    cache=True, nogil=True,
+)
+def _closest_rows(  # type: ignore[no-untyped-def]
+    boxes, children, order, corners, queries, max_distance, triangle, barycentric, distance, start, stop
+):
+    stack, keys = new_stack()
+    limit2 = max_distance * max_distance * (1.0 + 1e-12)  # a point exactly at the limit is within it
+    for i in range(start, stop):
+        x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
+        slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, x, y, z, limit2, stack, keys)
+        triangle[i] = order[slot] if slot >= 0 else -1
+        barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = b0, b1, b2
+        distance[i] = math.sqrt(d2) if slot >= 0 else np.inf
+
+
+@njit(
+    types.void(
+        F32_2D, I32_2D, I32_1D, F32_2D, F32_2D, F32_2D, types.float64,
+        types.float32[::1], types.int32[::1], types.float32[:, ::1], types.int64, types.int64,
+    ),
+    cache=True, nogil=True,
+)
+def _ray_rows(  # type: ignore[no-untyped-def]
+    boxes, children, order, corners, origins, directions, limit, distance, triangle, barycentric, start, stop
+):
+    stack, keys = new_stack()
+    for i in range(start, stop):
+        slot, t, b0, b1, b2 = ray_one(
+            boxes, children, corners, origins[i, 0], origins[i, 1], origins[i, 2],
+            directions[i, 0], directions[i, 1], directions[i, 2], limit, False, stack, keys,
+        )
+        triangle[i] = order[slot] if slot >= 0 else -1
+        distance[i] = t if slot >= 0 else np.inf
+        barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = b0, b1, b2
+
+
+@njit(
+    types.void(F32_2D, I32_2D, F32_2D, F32_2D, F32_2D, types.boolean[::1], types.int64, types.int64),
+    cache=True, nogil=True,
+)
+def _segment_rows(boxes, children, corners, starts, ends, out, start, stop):  # type: ignore[no-untyped-def]
+    stack, keys = new_stack()
+    for i in range(start, stop):
+        out[i] = any_hit_segment(
+            boxes, children, corners, starts[i, 0], starts[i, 1], starts[i, 2],
+            ends[i, 0], ends[i, 1], ends[i, 2], stack, keys,
+        )
