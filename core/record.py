@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, dataclass_transform
 
 import msgspec
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 
+# the decorator only tells type checkers that subclasses are frozen too
+@dataclass_transform(frozen_default=True, kw_only_default=True, eq_default=False)
 class Record(
     msgspec.Struct, frozen=True, eq=False, weakref=True, kw_only=True, forbid_unknown_fields=True
 ):

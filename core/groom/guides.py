@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.mesh.roots import Roots
-from core.record import Record, column
+from core.record import Record, column, number
 
 
 class Guides(Record):
@@ -41,6 +41,7 @@ class Guides(Record):
         ids = self.ids if np.all(self.ids[1:] > self.ids[:-1]) else np.sort(self.ids)  # mostly sorted already
         if n and (self.next_id <= int(ids[-1]) or np.any(ids[1:] == ids[:-1])):
             raise ValueError("Guides.ids must be unique and below next_id")
+        number(self, "next_id", least=0, most=2**31 - 1)
 
     def __len__(self) -> int:
         return len(self.ids)

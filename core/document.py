@@ -1,0 +1,155 @@
+"""The document: everything the artist makes, one frozen value. Beside it the workspace, which undo leaves alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from core.camera import Camera
+from core.errors import UserError
+from core.groom.groom import Groom
+from core.mesh.mesh import Mesh
+from core.record import Record, number, text
+
+METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+
+class MeshObject(Record):
+    """A mesh in the document.
+
+    id : stable, unique in the document.
+    hidden, locked : as the artist set them; a locked mesh is not edited.
+    """
+
+    id: int
+    name: str
+    mesh: Mesh
+    hidden: bool = False
+    locked: bool = False
+
+    def __post_init__(self) -> None:
+        text(self, "name")
+        number(self, "id", least=0, most=2**31 - 1)
+
+
+class Document(Record):
+    """Everything undo brings back.
+
+    unit : the length unit of the panels (lengths inside are metres).
+    fps : frames per second.
+    first_frame, last_frame : the range of the timeline; frames may start anywhere.
+    meshes, grooms : each with ids unique among their kind.
+    """
+
+    unit: str = "m"
+    fps: float = 24.0
+    first_frame: int = 1001
+    last_frame: int = 1100
+    meshes: tuple[MeshObject, ...] = ()
+    grooms: tuple[Groom, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.unit not in METRES_PER_UNIT:
+            raise ValueError(f"Document.unit must be one of {', '.join(METRES_PER_UNIT)}, not {self.unit!r}")
+        number(self, "fps", least=0.001, most=100_000.0)
+        number(self, "first_frame", "last_frame", least=-(2**31), most=2**31 - 1)
+        if self.first_frame > self.last_frame:
+            raise ValueError("Document.first_frame comes after last_frame")
+        mesh_ids = {m.id for m in self.meshes}
+        if len(mesh_ids) != len(self.meshes) or len({g.id for g in self.grooms}) != len(self.grooms):
+            raise ValueError("Document holds two things of the same id")
+        for groom in self.grooms:
+            if groom.mesh_id not in mesh_ids:
+                raise ValueError(f"Document.grooms: the mesh {groom.mesh_id} of groom {groom.name!r} does not exist")
+
+
+class Workspace(Record):
+    """Where the artist left off; saved beside the document, outside undo.
+
+    frame : the current frame.
+    cameras : the cameras of the views, first the one last used.
+    panels : names of the visible panels.
+    tool : name of the active tool; params : its parameters as plain JSON values, never changed in place.
+    """
+
+    frame: float = 1001.0
+    cameras: tuple[Camera, ...] = ()
+    panels: tuple[str, ...] = ()
+    tool: str = ""
+    params: dict[str, Any] = {}  # noqa: RUF012 (msgspec makes a new one each time)
+
+    def __post_init__(self) -> None:
+        number(self, "frame", least=-(2**31), most=2**31 - 1)
+
+
+def find_mesh(document: Document, mesh_id: int) -> MeshObject:
+    """The mesh of that id; UserError when there is none."""
+    for item in document.meshes:
+        if item.id == mesh_id:
+            return item
+    raise UserError(f"There is no mesh {mesh_id} in this document; choose one of {[m.id for m in document.meshes]}.")
+
+
+def find_groom(document: Document, groom_id: int) -> Groom:
+    """The groom of that id; UserError when there is none."""
+    for item in document.grooms:
+        if item.id == groom_id:
+            return item
+    raise UserError(f"There is no groom {groom_id} in this document; choose one of {[g.id for g in document.grooms]}.")
+
+
+def with_mesh(document: Document, item: MeshObject) -> Document:
+    """The document with `item` in place of the mesh of the same id, or added at the end."""
+    return document.replace(meshes=_put(document.meshes, item))
+
+
+def with_groom(document: Document, groom: Groom) -> Document:
+    """The document with `groom` in place of the groom of the same id, or added at the end."""
+    return document.replace(grooms=_put(document.grooms, groom))
+
+
+def without_groom(document: Document, groom_id: int) -> Document:
+    """The document without that groom."""
+    return document.replace(grooms=tuple(g for g in document.grooms if g.id != groom_id))
+
+
+def without_mesh(document: Document, mesh_id: int) -> Document:
+    """The document without that mesh and without the grooms that grow on it."""
+    return document.replace(
+        meshes=tuple(m for m in document.meshes if m.id != mesh_id),
+        grooms=tuple(g for g in document.grooms if g.mesh_id != mesh_id),
+    )
+
+
+def _put(items: tuple[Any, ...], item: Any) -> tuple[Any, ...]:
+    if any(have.id == item.id for have in items):
+        return tuple(item if have.id == item.id else have for have in items)
+    return (*items, item)
+
+
+def free_id(items: tuple[Any, ...]) -> int:
+    """An id none of `items` has (one above the highest; 1 for the first)."""
+    return max((item.id for item in items), default=0) + 1
+
+
+def problems(document: Document) -> list[str]:
+    """What the records cannot see by themselves: references from one to another, one sentence each.
+
+    Kernels trust these (they run without bounds checks), so a file is only opened when the list is empty.
+    """
+    found: list[str] = []
+    for groom in document.grooms:
+        mesh, roots = find_mesh(document, groom.mesh_id).mesh, groom.guides.roots
+        if len(roots.faces):
+            if roots.faces.min() < 0 or roots.faces.max() >= len(mesh.counts):
+                found.append(f"Groom {groom.name!r} has a root on a face that its mesh does not have.")
+            elif roots.corners.min() < 0 or np.any(roots.corners >= mesh.counts[roots.faces][:, None]):
+                found.append(f"Groom {groom.name!r} has a root on a corner that its face does not have.")
+        for item in groom.maps:
+            if item.values is not None and len(item.values) != len(mesh.points):
+                found.append(
+                    f"Map {item.name!r} of groom {groom.name!r} has {len(item.values)} values "
+                    f"for {len(mesh.points)} vertices."
+                )
+    return found
