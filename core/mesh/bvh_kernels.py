@@ -10,13 +10,13 @@ from numba import njit
 STACK_SIZE = 64
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def new_stack():  # type: ignore[no-untyped-def]
     """Room for one traversal at a time: nodes (64,) int32 and their keys (64,) float64 (make it once per kernel)."""
     return np.empty(STACK_SIZE, np.int32), np.empty(STACK_SIZE, np.float64)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def closest_on_triangle(corners, slot, qx, qy, qz):  # type: ignore[no-untyped-def]
     """Closest point of the triangle in a slot to q: squared distance and barycentric (kernel form).
 
@@ -60,7 +60,7 @@ def closest_on_triangle(corners, slot, qx, qy, qz):  # type: ignore[no-untyped-d
     return x * x + y * y + z * z, 1.0 - v - w, v, w
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def _box_distance2(boxes, node, at, x, y, z):  # type: ignore[no-untyped-def]
     dx = max(boxes[node, at] - x, x - boxes[node, at + 3], np.float32(0.0))
     dy = max(boxes[node, at + 1] - y, y - boxes[node, at + 4], np.float32(0.0))
@@ -68,7 +68,7 @@ def _box_distance2(boxes, node, at, x, y, z):  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy + dz * dz
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def closest_one(boxes, children, corners, x, y, z, limit2, stack, keys):  # type: ignore[no-untyped-def]
     """Closest point of the skin to (x, y, z) float32 (kernel form).
 
@@ -113,7 +113,7 @@ def closest_one(boxes, children, corners, x, y, z, limit2, stack, keys):  # type
                 node = stack[top]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def _box_entry(boxes, node, at, ox, oy, oz, ix, iy, iz, limit):  # type: ignore[no-untyped-def]
     """Where the ray enters the box, or a negative number when it misses it before `limit`."""
     x0, x1 = (boxes[node, at] - ox) * ix, (boxes[node, at + 3] - ox) * ix
@@ -125,7 +125,7 @@ def _box_entry(boxes, node, at, ox, oy, oz, ix, iy, iz, limit):  # type: ignore[
     return enter if enter <= leave * (1.0 + 1e-14) + 1e-300 and boxes[node, at] <= boxes[node, at + 3] else -1.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def _ray_on_triangle(corners, slot, ox, oy, oz, kx, ky, kz, sx, sy, sz):  # type: ignore[no-untyped-def]
     """Distance (negative: missed) and barycentric of a ray meeting the triangle, either side.
 
@@ -149,7 +149,7 @@ def _ray_on_triangle(corners, slot, ox, oy, oz, kx, ky, kz, sx, sy, sz):  # type
     return (u * az + v * bz + w * cz) * sz, u, v, w
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def ray_one(boxes, children, corners, ox, oy, oz, dx, dy, dz, limit, any_hit, stack, keys):  # type: ignore[no-untyped-def]
     """The first triangle (with `any_hit` whichever comes first) on o + t d, 0 <= t <= limit (kernel form).
 
@@ -209,7 +209,7 @@ def ray_one(boxes, children, corners, ox, oy, oz, dx, dy, dz, limit, any_hit, st
                 node = stack[top]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def any_hit_segment(boxes, children, corners, ax, ay, az, bx, by, bz, stack, keys):  # type: ignore[no-untyped-def]
     """True when the segment from a to b meets the skin (kernel form)."""
     found = ray_one(boxes, children, corners, ax, ay, az, bx - ax, by - ay, bz - az, 1.0, True, stack, keys)
