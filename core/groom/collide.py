@@ -1,0 +1,240 @@
+"""Hair stays outside the skin: chains are lifted over a signed distance field, points and segments alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from core.groom.chain import first_free, read_chain, rebuild_chain, write_chain
+from core.groom.guides import Guides
+from core.groom.region import editable
+from core.record import freeze
+from core.workers import serial_ranges
+
+if TYPE_CHECKING:
+    from core.mesh.distance_field import DistanceField
+
+Ranges = Callable[[int, Callable[[int, int], object]], None]
+
+F32_2D = types.Array(types.float32, 2, "C", readonly=True)
+F32_3D = types.Array(types.float32, 3, "C", readonly=True)
+NO_FIELD = freeze(np.zeros((0, 0, 0), np.float32))
+REPEATS = 4
+
+
+@njit(cache=True, nogil=True)
+def field_value(values, ox, oy, oz, inverse_cell, px, py, pz):  # type: ignore[no-untyped-def]
+    """Signed distance at one point, trilinear; outside the grid that of its border plus the way there."""
+    fx, fy, fz = (px - ox) * inverse_cell, (py - oy) * inverse_cell, (pz - oz) * inverse_cell
+    nx, ny, nz = values.shape
+    cx = min(max(fx, 0.0), nx - 1.000001)
+    cy = min(max(fy, 0.0), ny - 1.000001)
+    cz = min(max(fz, 0.0), nz - 1.000001)
+    i, j, k = int(cx), int(cy), int(cz)
+    a, b, c = cx - i, cy - j, cz - k
+    v00 = values[i, j, k] * (1.0 - c) + values[i, j, k + 1] * c
+    v01 = values[i, j + 1, k] * (1.0 - c) + values[i, j + 1, k + 1] * c
+    v10 = values[i + 1, j, k] * (1.0 - c) + values[i + 1, j, k + 1] * c
+    v11 = values[i + 1, j + 1, k] * (1.0 - c) + values[i + 1, j + 1, k + 1] * c
+    inside = (v00 * (1.0 - b) + v01 * b) * (1.0 - a) + (v10 * (1.0 - b) + v11 * b) * a
+    dx, dy, dz = fx - cx, fy - cy, fz - cz
+    beyond = dx * dx + dy * dy + dz * dz
+    if beyond > 1e-8:
+        return inside + math.sqrt(beyond) / inverse_cell
+    return inside
+
+
+@njit(cache=True, nogil=True)
+def field_normal(values, ox, oy, oz, inverse_cell, px, py, pz):  # type: ignore[no-untyped-def]
+    """Signed distance and unit outward normal at one point: (d, nx, ny, nz); a zero normal where the field is flat."""
+    fx, fy, fz = (px - ox) * inverse_cell, (py - oy) * inverse_cell, (pz - oz) * inverse_cell
+    nx, ny, nz = values.shape
+    cx = min(max(fx, 0.0), nx - 1.000001)
+    cy = min(max(fy, 0.0), ny - 1.000001)
+    cz = min(max(fz, 0.0), nz - 1.000001)
+    i, j, k = int(cx), int(cy), int(cz)
+    a, b, c = cx - i, cy - j, cz - k
+    p000, p001 = np.float64(values[i, j, k]), np.float64(values[i, j, k + 1])
+    p010, p011 = np.float64(values[i, j + 1, k]), np.float64(values[i, j + 1, k + 1])
+    p100, p101 = np.float64(values[i + 1, j, k]), np.float64(values[i + 1, j, k + 1])
+    p110, p111 = np.float64(values[i + 1, j + 1, k]), np.float64(values[i + 1, j + 1, k + 1])
+    v00, v01 = p000 * (1.0 - c) + p001 * c, p010 * (1.0 - c) + p011 * c
+    v10, v11 = p100 * (1.0 - c) + p101 * c, p110 * (1.0 - c) + p111 * c
+    v0, v1 = v00 * (1.0 - b) + v01 * b, v10 * (1.0 - b) + v11 * b
+    gx = v1 - v0
+    gy = (v01 - v00) * (1.0 - a) + (v11 - v10) * a
+    gz = ((p001 - p000) * (1.0 - b) + (p011 - p010) * b) * (1.0 - a) + (
+        (p101 - p100) * (1.0 - b) + (p111 - p110) * b
+    ) * a
+    size = math.sqrt(gx * gx + gy * gy + gz * gz) * inverse_cell
+    value = v0 * (1.0 - a) + v1 * a
+    if size < 0.3:  # a true distance changes by 1 per metre; this is the flat rest beyond the band, or a ridge
+        return value, 0.0, 0.0, 0.0
+    size = inverse_cell / size
+    return value, gx * size, gy * size, gz * size
+
+
+@njit(cache=True, nogil=True)
+def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, clearance, move):  # type: ignore[no-untyped-def]
+    """Lift segments `first` .. end of one chain off the skin, root to tip, lengths kept; returns the lowest distance.
+
+    Each segment is sampled at its end and between, at most a cell of the grid apart, unless both ends are so far out
+    that nothing between can touch. The sample that asks for most raises the direction of the segment along its normal;
+    what lies beyond is carried. Distances are read relative to that of the root, which lies on the skin where the
+    grid has an error there; the correction fades over four cells. Clearance grows over the first segment.
+    With `move` False nothing is changed, only measured.
+    """
+    count = lengths.shape[0]
+    cell = 1.0 / inverse_cell
+    at_root = field_value(values, ox, oy, oz, inverse_cell, x[0, 0], x[0, 1], x[0, 2])
+    at_root = min(max(at_root, -2.0 * cell), 2.0 * cell)
+    fade = 0.25 * inverse_cell
+    arc = 0.0
+    for j in range(first):
+        arc += lengths[j]
+    before = field_value(values, ox, oy, oz, inverse_cell, x[first, 0], x[first, 1], x[first, 2])
+    before -= at_root * max(0.0, 1.0 - arc * fade)
+    ramp = max(lengths[0], 1e-12)
+    lowest = np.inf
+    for j in range(first, count):
+        length = lengths[j]
+        if length <= 0.0:
+            x[j + 1, 0], x[j + 1, 1], x[j + 1, 2] = x[j, 0], x[j, 1], x[j, 2]
+            continue
+        pieces = min(8, max(2, int(length * inverse_cell) + 1))
+        at_end = 0.0
+        here = np.inf
+        for repeat in range(REPEATS + 1):
+            here = np.inf
+            worst, worst_t = 0.0, 1.0
+            for piece in range(pieces, 0, -1):
+                t = piece / pieces
+                s = arc + t * length
+                d = field_value(
+                    values, ox, oy, oz, inverse_cell,
+                    x[j, 0] + t * length * q[j, 0], x[j, 1] + t * length * q[j, 1], x[j, 2] + t * length * q[j, 2],
+                ) - at_root * max(0.0, 1.0 - s * fade)
+                need = clearance * min(1.0, s / ramp)
+                here = min(here, d)
+                if (need - d) / t > worst:
+                    worst, worst_t = (need - d) / t, t
+                if piece == pieces:
+                    at_end = d
+                    if before + d > length + 2.0 * clearance:
+                        break
+            if worst <= 1e-6 * length or repeat == REPEATS or not move:
+                break
+            step = worst_t * length
+            _, nx, ny, nz = field_normal(
+                values, ox, oy, oz, inverse_cell,
+                x[j, 0] + step * q[j, 0], x[j, 1] + step * q[j, 1], x[j, 2] + step * q[j, 2],
+            )
+            if nx * nx + ny * ny + nz * nz < 0.5:
+                break
+            rise = q[j, 0] * nx + q[j, 1] * ny + q[j, 2] * nz
+            tx, ty, tz = q[j, 0] - rise * nx, q[j, 1] - rise * ny, q[j, 2] - rise * nz
+            along = tx * tx + ty * ty + tz * tz
+            wanted = min(1.0, rise + 1.02 * worst / length)
+            if along < 1e-12:  # straight into the skin: any way along it will do
+                if abs(nx) < 0.6:
+                    tx, ty, tz = 0.0, nz, -ny
+                else:
+                    tx, ty, tz = -nz, 0.0, nx
+                along = tx * tx + ty * ty + tz * tz
+            keep = math.sqrt(max(0.0, 1.0 - wanted * wanted) / along)
+            q[j, 0], q[j, 1], q[j, 2] = keep * tx + wanted * nx, keep * ty + wanted * ny, keep * tz + wanted * nz
+        lowest = min(lowest, here)
+        before = at_end
+        arc += length
+        if move:
+            for k in range(3):
+                x[j + 1, k] = x[j, k] + length * q[j, k]
+    return lowest
+
+
+@njit(
+    types.void(
+        types.int64, types.int64, types.float32[:, :, ::1], F32_2D, types.Array(types.bool_, 1, "C", readonly=True),
+        F32_3D, types.float64, types.float64, types.float64, types.float64, types.float64,
+    ),
+    cache=True, nogil=True,
+)
+def _push_out_rows(start, stop, points, hold, edit, values, ox, oy, oz, inverse_cell, clearance):  # type: ignore[no-untyped-def]
+    count = points.shape[1]
+    x, q, lengths = np.empty((count, 3)), np.empty((count - 1, 3)), np.empty(count - 1)
+    freedom = np.empty(count - 1)
+    for row in range(start, stop):
+        if not edit[row]:
+            continue
+        first = first_free(hold, row, freedom)
+        if first == count - 1:
+            continue
+        quantum = read_chain(points, row, x, q, lengths)
+        total = lengths.sum()
+        gap = clearance * total
+        low = collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, gap, False)
+        if low >= 0.5 * gap * (lengths[0] / total if first == 0 and total > 0.0 else 1.0):
+            continue
+        collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, gap, True)
+        rebuild_chain(x, q, lengths, first)
+        write_chain(points, row, x, lengths, first, quantum)
+
+
+@njit(
+    types.void(
+        types.int64, types.int64, F32_3D, F32_3D, types.float64, types.float64, types.float64, types.float64,
+        types.float64[::1],
+    ),
+    cache=True, nogil=True,
+)
+def _lowest_rows(start, stop, points, values, ox, oy, oz, inverse_cell, out):  # type: ignore[no-untyped-def]
+    count = points.shape[1]
+    x, q, lengths = np.empty((count, 3)), np.empty((count - 1, 3)), np.empty(count - 1)
+    for row in range(start, stop):
+        read_chain(points, row, x, q, lengths)
+        out[row] = collide_chain(x, q, lengths, 0, values, ox, oy, oz, inverse_cell, 0.0, False)
+
+
+def push_out(
+    guides: Guides, field: DistanceField, clearance: float = 0.005, mask: NDArray[np.bool_] | None = None,
+    ranges: Ranges = serial_ranges,
+) -> Guides:
+    """Guides lifted off the skin: no point and no segment below it, lengths kept.
+
+    Parameters
+    ----------
+    field : signed distance to the skin, object space.
+    clearance : distance kept from the skin, as a fraction of the strand's length.
+    mask : (G,) bool, strands to treat; all editable ones when None.
+    """
+    edit = editable(guides) if mask is None else editable(guides) & mask
+    points = guides.points.copy()
+    ox, oy, oz, inverse_cell = field_numbers(field)
+    ranges(len(guides), lambda a, b: _push_out_rows(
+        a, b, points, guides.hold, edit, field.values, ox, oy, oz, inverse_cell, float(clearance)))
+    return guides.replace(points=freeze(points))
+
+
+def lowest_distances(
+    points: NDArray[np.float32], field: DistanceField, ranges: Ranges = serial_ranges
+) -> NDArray[np.float64]:
+    """(G,) metres: the lowest signed distance met along each strand (points and segments), negative inside the skin.
+
+    Distances count from that of the root, which lies on the skin (see :func:`collide_chain`).
+    """
+    out = np.full(len(points), np.inf)
+    ox, oy, oz, inverse_cell = field_numbers(field)
+    ranges(len(points), lambda a, b: _lowest_rows(a, b, points, field.values, ox, oy, oz, inverse_cell, out))
+    return out
+
+
+def field_numbers(field: DistanceField | None) -> tuple[float, float, float, float]:
+    """Origin x, y, z and the inverse of the cell of a field, as kernels take them (zeros for none)."""
+    if field is None:
+        return 0.0, 0.0, 0.0, 0.0
+    return float(field.origin[0]), float(field.origin[1]), float(field.origin[2]), 1.0 / float(field.cell)
