@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 @njit("uint32(uint32, uint32)", cache=True, inline="always")
-def hash32(key: int, seed: int) -> int:
+def hash32(key: int | np.uint32, seed: int | np.uint32) -> np.uint32:
     """Hash one 32-bit key with a seed (kernel form)."""
     s = np.uint32(seed)
     h = np.uint32(np.uint32(key) ^ np.uint32(np.uint32(s * np.uint32(0x9E3779B9)) + np.uint32(0x7F4A7C15)))
@@ -27,16 +27,16 @@ def hash32(key: int, seed: int) -> int:
 
 
 @njit("float64(uint32, uint32)", cache=True, inline="always")
-def rand1(key: int, seed: int) -> float:
+def rand1(key: int | np.uint32, seed: int | np.uint32) -> float:
     """Uniform number in [0, 1) of one key (kernel form)."""
     return hash32(key, seed) * (1.0 / 4294967296.0)
 
 
-def rand(keys: ArrayLike, seed: int = 0) -> NDArray[np.float64]:
-    """Uniform numbers in [0, 1), one for each integer key (any shape), for an integer `seed`."""
+def rand(keys: ArrayLike, seed: ArrayLike = 0) -> NDArray[np.float64]:
+    """Uniform numbers in [0, 1), one for each integer key, for an integer `seed`; the two broadcast."""
     with np.errstate(over="ignore"):
         k = np.asarray(keys).astype(np.int64).astype(np.uint32)
-        s = np.uint32(seed & 0xFFFFFFFF)
+        s = np.asarray(seed).astype(np.int64).astype(np.uint32)
         h = k ^ (s * np.uint32(0x9E3779B9) + np.uint32(0x7F4A7C15))
         h ^= h >> np.uint32(16)
         h *= np.uint32(0x85EBCA6B)
