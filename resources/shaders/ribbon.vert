@@ -1,0 +1,23 @@
+// Camera-facing ribbons. The vertex number says strand, point and side; half a pixel is added on both sides for the filter.
+uniform sampler2D strand_sides;
+uniform sampler2D strand_colors;
+uniform mat4 clip_from_world;
+uniform vec2 picture_size;
+noperspective out float from_middle;
+noperspective out float half_width;
+noperspective out vec4 color;
+
+void main()
+{
+    int number = gl_VertexID >> 1;
+    int strand = number / points_per_strand;
+    int point = number - strand * points_per_strand;
+    int row = strand / strands_per_row;
+    ivec2 at = ivec2((strand - row * strands_per_row) * points_per_strand + point, row);
+    vec4 side = texelFetch(strand_sides, at, 0);
+    color = texelFetch(strand_colors, at, 0);
+    half_width = side.z;
+    from_middle = (float(gl_VertexID & 1) * 2.0 - 1.0) * (half_width + 0.5);
+    gl_Position = clip_from_world * vec4(strand_point(strand, point), 1.0);
+    gl_Position.xy += side.xy * from_middle * 2.0 / picture_size * gl_Position.w;
+}

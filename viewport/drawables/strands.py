@@ -1,0 +1,149 @@
+"""A coat of hair on the graphics card."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from core.random import rand
+from viewport.scene import Coat, Look
+from viewport.shaders import program, set_uniforms
+from viewport.strand_textures import StrandTextures
+
+SHADOW_HAIRS = 150_000  # more than these are drawn into the light's maps as every second, third ... one, each heavier
+SHADOW_PIECES = 6  # a hair casts its shadow as this many straight pieces at least
+ABSORPTION = 0.55  # per width of hair over width of texel; below 1 as hair scatters light onwards
+
+
+class StrandPrograms:
+    """The programs every coat is drawn with."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        points = "strand_points.glsl"
+        self.shade = program(ctx, ("fullscreen.vert",), (points, "lighting.glsl", "strand_shade.frag"))
+        self.depth = program(ctx, (points, "strand_light.vert"), ("depth_only.frag",))
+        self.opacity = program(ctx, (points, "strand_light.vert"), ("strand_opacity.frag",))
+
+    def release(self) -> None:
+        """Give back the memory; the context must be current."""
+        for thing in (self.shade, self.depth, self.opacity):
+            thing.release()
+
+
+def strand_tints(coat: Coat) -> NDArray[np.float32]:
+    """(N, 4) float32: linear factors on the colour of each hair and a factor on its width, keyed on the ids."""
+    look = coat.look
+    ids = np.asarray(coat.ids)
+    value = np.exp2(look.value_variation * 2.0 * (rand(ids, 11) + rand(ids, 12) - 1.0))
+    warmth = look.hue_variation * (2.0 * rand(ids, 13) - 1.0)
+    out = np.empty((len(ids), 4), np.float32)
+    out[:, 0] = value * (1.0 + 0.16 * warmth)
+    out[:, 1] = value
+    out[:, 2] = value * (1.0 - 0.38 * warmth)
+    out[:, 3] = 0.75 + 0.5 * rand(ids, 14)
+    if coat.tints is not None:
+        out[:, :3] *= coat.tints
+    return out
+
+
+def mean_width(look: Look) -> float:
+    """Mean diameter in metres along a hair: the taper goes with the square of the way from the root."""
+    return look.root_width + (look.tip_width - look.root_width) / 3.0
+
+
+class CoatDrawable:
+    """Textures of one coat, kept as long as its arrays are the same ones."""
+
+    def __init__(self, ctx: moderngl.Context, programs: StrandPrograms, coat: Coat) -> None:
+        self.coat = coat
+        self.programs = programs
+        self.textures = StrandTextures(ctx, coat.points)
+        self.tints = self.textures.per_strand_texture(strand_tints(coat))
+        self.normals = self.textures.per_strand_texture(_four(coat.normals))
+        self.shade = ctx.vertex_array(programs.shade, [])
+        self.depth = ctx.vertex_array(programs.depth, [])
+        self.opacity = ctx.vertex_array(programs.opacity, [])
+
+    def holds(self, coat: Coat) -> bool:
+        """True when the textures hold just these arrays and this variation."""
+        mine = self.coat
+        return mine.points is coat.points and mine.normals is coat.normals and not self._tints_differ(coat)
+
+    def _tints_differ(self, coat: Coat) -> bool:
+        mine = self.coat
+        return (
+            mine.ids is not coat.ids or mine.tints is not coat.tints
+            or mine.look.value_variation != coat.look.value_variation
+            or mine.look.hue_variation != coat.look.hue_variation
+        )
+
+    def update(self, coat: Coat) -> bool:
+        """Upload what differs into the same textures; False when the size is another."""
+        mine = self.coat
+        if coat.points.shape != mine.points.shape:
+            return False
+        if coat.points is not mine.points:
+            self.upload_rows(coat, 0, len(coat.points))
+        if coat.normals is not mine.normals:
+            self.textures.write(self.normals, _four(coat.normals))
+        if self._tints_differ(coat):
+            self.textures.write(self.tints, strand_tints(coat))
+        self.coat = coat
+        return True
+
+    def upload_rows(self, coat: Coat, start: int, stop: int) -> None:
+        """Upload the points of the hairs from `start` to before `stop` again."""
+        self.textures.write(self.textures.points, coat.points.reshape(len(coat.points), -1), start, stop)
+
+    def draw_depth(self, light_from_world: NDArray[np.float64]) -> None:
+        """Draw the hairs as lines, depth alone, seen from the light."""
+        self._draw_lines(self.programs.depth, self.depth, {"light_from_world": light_from_world})
+
+    def draw_opacity(self, texel: float, uniforms: dict[str, Any]) -> None:
+        """Add the hairs to the layers of the light's opacity map; `texel` is the width of one of its texels, metres."""
+        step = self._shadow_step()
+        opacity = mean_width(self.coat.look) / texel * step
+        self._draw_lines(self.programs.opacity, self.opacity, {**uniforms, "opacity": opacity})
+
+    def _shadow_step(self) -> int:
+        return -(-self.textures.count // SHADOW_HAIRS) or 1
+
+    def _draw_lines(self, prog: moderngl.Program, vertices: moderngl.VertexArray, uniforms: dict[str, Any]) -> None:
+        if self.textures.count == 0:
+            return
+        step = self._shadow_step()
+        pieces = self.textures.per_strand - 1
+        skip = max(1, pieces // SHADOW_PIECES)
+        self.textures.bind(prog)
+        set_uniforms(prog, {**uniforms, "strand_step": step, "point_step": skip})
+        vertices.render(moderngl.LINE_STRIP, vertices=-(-pieces // skip) + 1, instances=-(-self.textures.count // step))
+
+    def work_out(self, uniforms: dict[str, Any]) -> None:
+        """Shade every point and lay its ribbon out on the screen (into the textures that the ribbons read)."""
+        if self.textures.count == 0:
+            return
+        prog, look = self.programs.shade, self.coat.look
+        self.textures.target.use()
+        self.textures.bind(prog)
+        self.tints.use(1)
+        self.normals.use(2)
+        set_uniforms(prog, {
+            **uniforms, "strand_tints": 1, "strand_normals": 2, "widths": (look.root_width, look.tip_width),
+            "root_color": look.root, "tip_color": look.tip, "blend": look.blend, "gloss": look.gloss,
+            "roughness": look.roughness, "absorption": ABSORPTION * look.depth,
+        })
+        self.shade.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Give back the memory; the context must be current."""
+        for thing in (self.shade, self.depth, self.opacity, self.tints, self.normals, self.textures):
+            thing.release()
+
+
+def _four(vectors: np.ndarray) -> NDArray[np.float32]:
+    out = np.zeros((len(vectors), 4), np.float32)
+    out[:, :3] = vectors
+    return out

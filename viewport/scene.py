@@ -1,0 +1,150 @@
+"""What is drawn: plain tuples of arrays, made anew for every picture at no cost.
+
+Buffers on the graphics card are kept by the identity (``is``) of these arrays. Colours are linear, in Rec. 709
+primaries. Points are in world space, metres.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+Color = tuple[float, float, float]
+Floats = NDArray[np.float32]
+
+
+class Surface(NamedTuple):
+    """A triangulated mesh.
+
+    points : (V, 3) float32. normals : (V, 3) float32, unit. triangles : (T, 3) int32.
+    color : linear RGB of the skin; under a coat take :func:`skin_under`.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    triangles: np.ndarray
+    color: Color = (0.36, 0.35, 0.34)
+
+
+class Look(NamedTuple):
+    """How hair looks.
+
+    root, tip : linear RGB at both ends; `blend` is where along the hair (0 .. 1) they meet half and half.
+    value_variation, hue_variation : spread of brightness and of warmth between hairs, 0 none .. 1 strong.
+    root_width, tip_width : diameters in metres.
+    gloss : strength of both highlights. roughness : their longitudinal width in radians.
+    depth : how quickly light is swallowed inside the coat, 1 usual; 0 gives no shadow of hair upon hair.
+    """
+
+    root: Color = (0.045, 0.024, 0.012)
+    tip: Color = (0.46, 0.25, 0.115)
+    blend: float = 0.42
+    value_variation: float = 0.35
+    hue_variation: float = 0.25
+    root_width: float = 8e-5
+    tip_width: float = 1e-5
+    gloss: float = 1.0
+    roughness: float = 0.16
+    depth: float = 1.0
+
+
+class Coat(NamedTuple):
+    """Hairs with the same number of points P each.
+
+    points : (N, 3, P) or (N, P, 3) float32, root first (with P = 3 the former is taken).
+    ids : (N,) integers; the variation between hairs is keyed on them.
+    normals : (N, 3) float32, unit, of the skin at the roots.
+    tints : (N, 3) float32 or None, linear factors on the colour of each hair (a painted map).
+    """
+
+    points: np.ndarray
+    ids: np.ndarray
+    normals: np.ndarray
+    look: Look = Look()
+    tints: np.ndarray | None = None
+
+
+class GuideLines(NamedTuple):
+    """Guides as lines of constant width in pixels.
+
+    points : (G, P, 3) or (G, 3, P) float32. states : (G,) uint8, indices into `colors`.
+    """
+
+    points: np.ndarray
+    states: np.ndarray
+    colors: tuple[Color, ...] = ((0.74, 0.39, 0.10), (1.0, 0.86, 0.55), (0.25, 0.45, 0.75))
+    pixels: float = 1.5
+
+
+class Lights(NamedTuple):
+    """Key, fill and rim light: directions towards the light, linear RGB strengths.
+
+    Directions are in camera space (x right, y up, z towards the viewer) when `follow_camera`, else in world space.
+    """
+
+    key: Color = (-0.62, 0.80, 0.55)
+    key_color: Color = (3.3, 3.1, 2.85)
+    fill: Color = (0.85, 0.15, 0.6)
+    fill_color: Color = (0.34, 0.38, 0.46)
+    rim: Color = (0.55, 0.5, -0.85)
+    rim_color: Color = (1.5, 1.55, 1.7)
+    sky_color: Color = (0.42, 0.44, 0.48)
+    ground_color: Color = (0.12, 0.105, 0.09)
+    follow_camera: bool = True
+
+
+class Scene(NamedTuple):
+    """Everything in one picture. `background` is display RGB 0 .. 1 at the top and at the bottom."""
+
+    surfaces: tuple[Surface, ...] = ()
+    coats: tuple[Coat, ...] = ()
+    guides: tuple[GuideLines, ...] = ()
+    lights: Lights = Lights()
+    background: tuple[Color, Color] = ((0.2275, 0.2314, 0.2471), (0.1216, 0.1255, 0.1373))
+    exposure: float = 1.0
+
+
+def skin_under(look: Look) -> Color:
+    """The colour of skin that never shines through a coat of that look."""
+    r, g, b = (0.6 * c for c in look.root)
+    return (r, g, b)
+
+
+def root_normals(points: np.ndarray, surface: Surface) -> Floats:
+    """Normals (N, 3) at the first points of the hairs (see :class:`Coat`), from the nearest vertex of the surface."""
+    if len(points) == 0 or len(surface.points) == 0:
+        return np.zeros((len(points), 3), np.float32)
+    roots = points[:, :, 0] if points.shape[1] == 3 else points[:, 0, :]
+    return np.ascontiguousarray(surface.normals[cKDTree(surface.points).query(roots)[1]], dtype=np.float32)
+
+
+def scene_extent(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner (3,) of everything in the scene; a unit box when it is empty."""
+    lows, highs = [], []
+    for points in all_points(scene):
+        if len(points):
+            lows.append(points.min(axis=0))
+            highs.append(points.max(axis=0))
+    if not lows:
+        return np.full(3, -0.5), np.full(3, 0.5)
+    return np.min(lows, axis=0).astype(np.float64), np.max(highs, axis=0).astype(np.float64)
+
+
+def all_points(scene: Scene) -> list[np.ndarray]:
+    """Arrays (n, 3) that bound the scene: vertices of the surfaces; roots, middles and tips of hairs and guides."""
+    found = [surface.points for surface in scene.surfaces]
+    for strands in (*scene.coats, *scene.guides):
+        points = strands.points
+        axis = 2 if points.shape[1] == 3 else 1
+        for at in (0, points.shape[axis] // 2, points.shape[axis] - 1):
+            found.append(points.take(at, axis=axis))
+    return found
+
+
+def direction(vector: ArrayLike) -> NDArray[np.float64]:
+    """The vector (3,) with length 1."""
+    v = np.asarray(vector, np.float64)
+    return v / max(float(np.linalg.norm(v)), 1e-12)
