@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from core.document import Document, Workspace
+from core.errors import UserError
 from core.formats.arrays import ArrayHashes, ArraySpec, spec_of
 from core.formats.upgrade import FORMAT, upgrade
 
@@ -99,7 +100,7 @@ def decode_part(envelope: Envelope, key: str, kind: type[T], arrays: Mapping[str
         return msgspec.convert(envelope.raw[key], kind, dec_hook=leaf, strict=True)
     except msgspec.ValidationError as error:
         raise ValueError(f"{key}: {error}") from None
-    except (RecursionError, OverflowError) as error:
+    except (UserError, RecursionError, OverflowError) as error:
         raise ValueError(f"{key}: {error}") from None
 
 

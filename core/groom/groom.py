@@ -6,6 +6,7 @@ import numpy as np
 
 from core.groom.guides import Guides
 from core.record import Record, column, number, text
+from core.value import Value, constant
 
 MOST_CHILDREN = 20_000_000
 LARGEST_MAP = 16384  # pixels along a side
@@ -17,7 +18,7 @@ class Coat(Record):
     count : children wanted at density 1.
     seed : of everything random about the coat.
     density : 0 .. 1, the share of the children shown.
-    length : factor on the length of the guides.
+    length : factor on the length of the guides; may follow the frame, an expression, a map.
     width_root, width_tip : DIAMETERS in metres.
     color_root, color_tip : linear RGB.
     clump : 0 .. 1, how far hairs close up towards their guide.
@@ -30,7 +31,7 @@ class Coat(Record):
     count: int = 100_000
     seed: int = 0
     density: float = 1.0
-    length: float = 1.0
+    length: Value = constant(1.0)
     width_root: float = 8e-5
     width_tip: float = 2e-5
     color_root: tuple[float, float, float] = (0.10, 0.06, 0.035)
@@ -46,7 +47,6 @@ class Coat(Record):
         number(self, "count", least=0, most=MOST_CHILDREN)
         number(self, "seed", least=0, most=2**32 - 1)
         number(self, "density", "clump", "frizz", "length_variation", least=0.0, most=1.0)
-        number(self, "length", least=0.0, most=1e6)
         number(self, "width_root", "width_tip", least=0.0, most=1e3)
         number(self, "color_root", "color_tip", least=0.0, most=1e4)
         number(self, "points", least=2, most=1024)

@@ -1,0 +1,180 @@
+"""The headless application: one document with its workspace, its history, an evaluator and an autosave."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from core.document import Document, Workspace
+from core.errors import UserError
+from core.evaluator import Evaluator
+from core.formats.arrays import ArrayHashes
+from core.formats.journal import Journal, remove_journal, state_folder
+from core.formats.project import read_project, write_project
+from core.formats.recovery import abandoned, recover, recover_newest
+from core.history import DEFAULT_BUDGET, History
+
+Listener = Callable[[Document, Document], None]
+
+
+class Session:
+    """What a hand, a script and a test drive alike. Used from one thread.
+
+    document : the value shown, which during a stroke is a preview.
+    workspace : frame, cameras, panels; replace it freely, undo leaves it alone.
+    changed : called with the old and the new value after every change of `document`; the one listener there is.
+    """
+
+    def __init__(
+        self,
+        document: Document | None = None,
+        workspace: Workspace | None = None,
+        *,
+        path: Path | None = None,
+        journal: Journal | None = None,
+        evaluator: Evaluator | None = None,
+        history_bytes: int = DEFAULT_BUDGET,
+        hashes: ArrayHashes | None = None,
+        name: str = "New",
+    ) -> None:
+        self.history: History[Document] = History(document or Document(), name, history_bytes)
+        self.workspace = workspace or Workspace()
+        self.evaluator = evaluator or Evaluator()
+        self.path = path
+        self.changed: Listener | None = None
+        self._document = self.history.current
+        self._saved: Document | None = self.history.current
+        self._hashes = hashes or ArrayHashes()
+        self._journal = journal
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str], journal: Journal | None = None) -> Session:
+        """A session on a project file; UserError when it cannot be opened."""
+        hashes = ArrayHashes()
+        document, workspace = read_project(path, hashes)
+        return cls(document, workspace, path=Path(path), journal=journal, hashes=hashes, name="Open")
+
+    @classmethod
+    def recover(cls, folder: Path | None = None, token: str | None = None) -> Session | None:
+        """A session on the newest work a killed program left behind, or None when there is none. Never raises.
+
+        Parameters
+        ----------
+        folder : of the journals; None for the usual one.
+        token : of the journal to recover (see :func:`core.formats.recovery.abandoned`); None for the newest.
+
+        The old journal is removed only when the state is safe in the new session's own.
+        """
+        folder = folder or state_folder()
+        state = recover_newest(folder) if token is None else recover(folder, token)
+        if state is None:
+            return None
+        path = None if state.project is None else Path(state.project)
+        session = cls(state.document, state.workspace, path=path, journal=Journal(folder), name=f"Recover {state.name}")
+        session._saved = state.document if state.saved else None
+        if session._journal is not None:
+            number = session._journal.commit(state.document, state.workspace, state.name, path, state.saved)
+            if session._journal.flush() >= number:
+                remove_journal(folder, state.token)
+        return session
+
+    @staticmethod
+    def tidy(folder: Path | None = None) -> None:
+        """Remove journals of killed programs whose newest state is in a project file already."""
+        folder = folder or state_folder()
+        for token in abandoned(folder):
+            state = recover(folder, token)
+            if state is not None and state.saved:
+                remove_journal(folder, token)
+
+    @property
+    def document(self) -> Document:
+        """The value shown."""
+        return self._document
+
+    @property
+    def saved(self) -> bool:
+        """True when the committed value is the one in the project file (or untouched since it was opened or made)."""
+        return self.history.current is self._saved
+
+    @property
+    def autosave_error(self) -> UserError | None:
+        """Why autosaving does not work at present, or None."""
+        return None if self._journal is None else self._journal.error
+
+    def preview(self, document: Document) -> None:
+        """Show a value without a step: what a stroke looks like while it goes on."""
+        self._show(document)
+
+    def cancel(self) -> None:
+        """Put the last committed value back."""
+        self._show(self.history.current)
+
+    def commit(self, name: str, document: Document) -> None:
+        """Make a value the current one, as one named step."""
+        if document is not self.history.current:
+            self.history.commit(name, document)
+            self._write_journal(name)
+        self._show(document)
+
+    def edit(self, name: str, function: Callable[..., Document], *args: Any, **parameters: Any) -> None:
+        """Commit ``function(document, *args, **parameters)`` of the last committed document as one named step.
+
+        When it raises, the document is as before.
+        """
+        self.cancel()
+        self.commit(name, function(self.history.current, *args, **parameters))
+
+    def undo(self) -> None:
+        """Go back one step (a preview is given up first)."""
+        name = self.history.undo_name
+        self._go(self.history.undo, f"Undo {name}")
+
+    def redo(self) -> None:
+        """Go forward one step."""
+        name = self.history.redo_name
+        self._go(self.history.redo, f"Redo {name}")
+
+    def jump(self, place: int) -> None:
+        """Go to a step by its place in ``history.names``."""
+        self._go(lambda: self.history.jump(place), "Jump")
+
+    def save(self, path: str | os.PathLike[str] | None = None) -> None:
+        """Save the committed value to `path`, or to the file it came from.
+
+        Raises
+        ------
+        UserError
+            No name yet, or it could not be saved; the earlier file is untouched.
+        """
+        target = Path(path) if path is not None else self.path
+        if target is None:
+            raise UserError("This document has no file yet: give a name to save under.")
+        write_project(target, self.history.current, self.workspace, self._hashes)
+        self.path, self._saved = target, self.history.current
+        self._write_journal("Save")
+
+    def close(self, discard: bool = False) -> None:
+        """End the session. Unsaved work stays recoverable unless `discard`."""
+        if self._journal is not None:
+            self._journal.close(remove=discard or self.saved)
+        self.history.close()
+        self.evaluator.close()
+
+    def _go(self, move: Callable[[], Document], name: str) -> None:
+        before = self.history.current
+        document = move()
+        if document is not before:
+            self._write_journal(name)
+        self._show(document)
+
+    def _show(self, document: Document) -> None:
+        old, self._document = self._document, document
+        if old is not document and self.changed is not None:
+            self.changed(old, document)
+
+    def _write_journal(self, name: str) -> None:
+        if self._journal is not None:
+            self._journal.commit(self.history.current, self.workspace, name, self.path, self.saved)
