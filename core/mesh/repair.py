@@ -1,0 +1,267 @@
+"""From the polygons of a file to a mesh that can be groomed: what is wrong is counted and worked around."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from core.errors import UserError
+from core.mesh.edges import Edges, next_corner
+from core.mesh.mesh import Mesh
+from core.mesh.orient import orient
+
+LARGEST = 1e12  # metres; beyond this squared float32 distances overflow, so such a vertex is as good as NaN
+
+PROBLEMS = {
+    "nonfinite_vertices": "vertices that are not finite numbers",
+    "out_of_range_faces": "faces naming vertices that do not exist",
+    "nonfinite_faces": "faces on vertices that are not finite",
+    "degenerate_faces": "faces with fewer than three different vertices",
+    "duplicate_faces": "faces that repeat another",
+    "zero_area_faces": "faces without area",
+    "duplicate_vertices": "vertices doubled along an edge",
+    "nonmanifold_edges": "edges shared by more than two faces",
+    "flipped_faces": "faces turned the other way",
+    "loose_vertices": "vertices no face uses",
+    "islands": "separate pieces",
+    "missing_uvs": "faces without UVs",
+}
+
+
+class Polygons(NamedTuple):
+    """The faces of a file before anything is believed.
+
+    points : (V, 3) float64, any values.
+    counts : (F,) int64, corners of each face, any values >= 0.
+    corners : (C,) int64, any values.
+    uvs : (C, 2) float32, NaN where a corner has none, or None.
+    parts : (F,) int32 rows of `part_names`.
+    """
+
+    points: np.ndarray
+    counts: np.ndarray
+    corners: np.ndarray
+    uvs: np.ndarray | None
+    parts: np.ndarray
+    part_names: tuple[str, ...]
+
+
+class Repaired(NamedTuple):
+    """A sound mesh; `problems` counts what was met, by kind (only kinds that were met; words in PROBLEMS).
+
+    vertex_of_source : (V of the polygons,) int32, where each vertex went.
+    face_of_source : (F of the polygons,) int32, where each face went, -1 where it was left out.
+    closed : the surface has an inside.
+    """
+
+    mesh: Mesh
+    problems: dict[str, int]
+    vertex_of_source: np.ndarray
+    face_of_source: np.ndarray
+    closed: bool
+
+
+def repair(polygons: Polygons) -> Repaired:
+    """Make a sound mesh of any polygons.
+
+    Faces that cannot be used are left out; coincident vertices are joined only where that pairs two open
+    edges (so files without shared vertices become surfaces, while touching pieces stay apart); faces of a
+    piece are turned to agree with most of it, and outwards where the piece is closed. Vertices keep their
+    order; those joined to an earlier one disappear. A vertex that is not finite is moved to the middle of the
+    others. Faces without area stay, because leaving them out would open a seam.
+
+    Raises
+    ------
+    UserError
+        When no face is left.
+    """
+    met: dict[str, int] = {}
+    points, bad = _finite_points(polygons.points, met)
+    kept = _usable_faces(polygons, bad, met)
+    faces = _take_faces(polygons, kept)
+    edges = Edges.of(faces.counts, faces.corners, len(points))
+    vertex_of_source = _join_open_edges(points, faces.counts, faces.corners, edges, met)
+    stays = vertex_of_source == np.arange(len(points))
+    if not stays.all():
+        vertex_of_source = (np.cumsum(stays) - 1)[vertex_of_source]
+        points, bad = points[stays], bad[stays]
+        joined = faces._replace(corners=vertex_of_source[faces.corners])
+        still = _usable_faces(joined, bad & False, met)
+        kept, faces = kept[still], _take_faces(joined, still)
+        edges = Edges.of(faces.counts, faces.corners, len(points))
+    counts, corners = faces.counts, faces.corners
+    met["flipped_faces"] = orient(points, counts, corners, faces.uvs, edges)
+    if met["flipped_faces"]:
+        edges = Edges.of(counts, corners, len(points))
+    uvs = _whole_uvs(faces.uvs, counts, met)
+    _count_the_rest(points, counts, corners, edges, met)
+    face_of_source = np.full(len(polygons.counts), -1, np.int32)
+    face_of_source[kept] = np.arange(len(kept))
+    mesh = Mesh(
+        points=points.astype(np.float32), counts=counts.astype(np.int32), corners=corners.astype(np.int32), uvs=uvs,
+        parts=faces.parts.astype(np.int32), part_names=polygons.part_names or ("mesh",),
+    )  # fmt: skip
+    problems = {kind: met[kind] for kind in PROBLEMS if met.get(kind)}
+    return Repaired(mesh, problems, vertex_of_source.astype(np.int32), face_of_source, edges.closed)
+
+
+def _finite_points(points: NDArray[np.float64], met: dict[str, int]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    bad: NDArray[np.bool_] = np.logical_not((np.abs(points) < LARGEST).all(axis=1))
+    met["nonfinite_vertices"] = int(bad.sum())
+    if bad.any():
+        if bad.all():
+            raise UserError("None of its vertices is a finite number; export it again.")
+        points = np.where(bad[:, None], points[~bad].mean(axis=0), points)
+    return points, bad
+
+
+def _usable_faces(polygons: Polygons, bad: NDArray[np.bool_], met: dict[str, int]) -> NDArray[np.int64]:
+    """Rows of the faces that name at least three different, existing, finite vertices and repeat no other."""
+    counts, corners = polygons.counts, polygons.corners
+    face_of_corner = np.repeat(np.arange(len(counts)), counts)
+    outside = (corners < 0) | (corners >= len(bad))
+    has_outside = np.zeros(len(counts), np.bool_)
+    has_outside[face_of_corner[outside]] = True
+    broken = np.zeros(len(counts), np.bool_)
+    if bad.any():
+        broken[face_of_corner[bad[np.where(outside, 0, corners)]]] = True
+        broken &= ~has_outside
+    repeats = _distinct_corners(counts, corners, face_of_corner)
+    degenerate = (repeats < 3) & ~has_outside & ~broken
+    usable = ~(has_outside | broken | degenerate)
+    double = np.zeros(len(counts), np.bool_)
+    starts = np.cumsum(counts) - counts
+    by_count = np.flatnonzero(usable)[np.argsort(counts[usable], kind="stable")]
+    for rows in np.split(by_count, np.flatnonzero(np.diff(counts[by_count])) + 1) if len(by_count) else ():
+        ring = np.sort(corners[starts[rows, None] + np.arange(counts[rows[0]])], axis=1)
+        by_ring = np.lexsort(ring.T[::-1])
+        same = (ring[by_ring[1:]] == ring[by_ring[:-1]]).all(axis=1)
+        double[rows[by_ring[1:][same]]] = True
+    met["out_of_range_faces"] = met.get("out_of_range_faces", 0) + int(has_outside.sum())
+    met["nonfinite_faces"] = met.get("nonfinite_faces", 0) + int(broken.sum())
+    met["degenerate_faces"] = met.get("degenerate_faces", 0) + int(degenerate.sum())
+    met["duplicate_faces"] = met.get("duplicate_faces", 0) + int(double.sum())
+    kept = np.flatnonzero(usable & ~double)
+    if not len(kept):
+        raise UserError("None of its faces can be used; export it again.")
+    return kept
+
+
+def _distinct_corners(
+    counts: NDArray[np.int64], corners: NDArray[np.int64], face_of_corner: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """How many different vertices each face names, (F,)."""
+    distinct = counts.copy()
+    starts = np.cumsum(counts) - counts
+    for size in (2, 3, 4):
+        rows = np.flatnonzero(counts == size)
+        ring = np.sort(corners[starts[rows, None] + np.arange(size)], axis=1)
+        distinct[rows] -= (ring[:, 1:] == ring[:, :-1]).sum(axis=1)
+    large = (counts > 4)[face_of_corner]
+    if large.any():
+        face, vertex = face_of_corner[large], corners[large]
+        order = np.lexsort((vertex, face))
+        face, vertex = face[order], vertex[order]
+        again = (face[1:] == face[:-1]) & (vertex[1:] == vertex[:-1])
+        distinct -= np.bincount(face[1:][again], minlength=len(counts))
+    return distinct
+
+
+def _take_faces(polygons: Polygons, kept: NDArray[np.int64]) -> Polygons:
+    """The kept faces, with a corner that repeats its neighbour left out."""
+    counts, corners, uvs, parts = polygons.counts, polygons.corners, polygons.uvs, polygons.parts
+    if len(kept) < len(counts):
+        rows = np.zeros(len(counts), np.bool_)
+        rows[kept] = True
+        mask = np.repeat(rows, counts)
+        counts, corners, parts = counts[kept], corners[mask], parts[kept]
+        uvs = None if uvs is None else uvs[mask]
+    again = corners[next_corner(counts)] == corners
+    if again.any():
+        counts = counts - np.bincount(np.repeat(np.arange(len(counts)), counts)[again], minlength=len(counts))
+        corners, uvs = corners[~again], None if uvs is None else uvs[~again]
+    # copies, because faces are turned in place later
+    uvs = None if uvs is None else uvs.astype(np.float32)
+    return polygons._replace(counts=counts, corners=corners.copy(), uvs=uvs, parts=parts)
+
+
+def _join_open_edges(
+    points: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    edges: Edges,
+    met: dict[str, int],
+) -> NDArray[np.int64]:
+    """Where each vertex goes, (V,): itself, or the first of those it coincides with along a pair of open edges."""
+    same = np.arange(len(points))
+    open_ = edges.order[(edges.uses == 1)[edges.group]]
+    if not len(open_):
+        return same
+    ends = np.stack([corners[open_], corners[next_corner(counts)[open_]]], axis=1)
+    used = np.unique(ends)
+    place = points[used] + 0.0  # -0.0 and 0.0 are the same place
+    by_place = np.lexsort(place.T)
+    new = np.append(True, (place[by_place[1:]] != place[by_place[:-1]]).any(axis=1))
+    if new.all():
+        return same
+    place_of = np.zeros(len(points), np.int64)
+    place_of[used[by_place]] = np.cumsum(new) - 1
+    at = place_of[ends]
+    swap = at[:, 0] > at[:, 1]
+    ends[swap], at[swap] = ends[swap][:, ::-1], at[swap][:, ::-1]
+    order = np.lexsort((at[:, 1], at[:, 0]))
+    ends, at = ends[order], at[order]
+    fresh = np.append(True, (at[1:] != at[:-1]).any(axis=1))
+    starts = np.flatnonzero(fresh)
+    pairs = starts[(np.diff(np.append(starts, len(at))) == 2) & (at[starts, 0] != at[starts, 1])]
+    one, two = ends[pairs].ravel(), ends[pairs + 1].ravel()
+    graph = coo_matrix((np.ones(len(one), np.int8), (one, two)), shape=(len(points), len(points)))
+    total, label = connected_components(graph, directed=False)
+    first = np.full(total, len(points))
+    np.minimum.at(first, label, same)
+    target = first[label]
+    met["duplicate_vertices"] = int((target != same).sum())
+    return target
+
+
+def _whole_uvs(
+    uvs: NDArray[np.float32] | None, counts: NDArray[np.int64], met: dict[str, int]
+) -> NDArray[np.float32] | None:
+    """UVs with 0 at faces that have none; None when no face has any."""
+    if uvs is None:
+        met["missing_uvs"] = len(counts)
+        return None
+    missing = ~(np.abs(uvs) < np.float32(1e6)).all(axis=1)
+    without = np.logical_or.reduceat(missing, np.cumsum(counts) - counts)
+    met["missing_uvs"] = int(without.sum())
+    if without.all():
+        return None
+    return np.where(np.repeat(without, counts)[:, None], np.float32(0), uvs)
+
+
+def _count_the_rest(
+    points: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    edges: Edges,
+    met: dict[str, int],
+) -> None:
+    met["nonmanifold_edges"] = int((edges.uses > 2).sum())
+    used = np.zeros(len(points), np.bool_)
+    used[corners] = True
+    met["loose_vertices"] = int(len(points) - used.sum())
+    following = corners[next_corner(counts)]
+    graph = coo_matrix((np.ones(len(corners), np.int8), (corners, following)), shape=(len(points), len(points)))
+    label = connected_components(graph, directed=False)[1]
+    islands = len(np.unique(label[used]))
+    met["islands"] = islands if islands > 1 else 0
+    starts = np.cumsum(counts) - counts
+    about = np.repeat(corners[starts], counts)
+    a, b = points[corners] - points[about], points[following] - points[about]
+    area = np.linalg.norm(np.add.reduceat(np.cross(a, b), starts), axis=1)
+    span = np.maximum.reduceat(np.einsum("ci,ci->c", a, a), starts)
+    met["zero_area_faces"] = int((area <= 1e-7 * span).sum())
