@@ -34,7 +34,7 @@ class Skeleton(Record):
             raise ValueError("Skeleton.bind holds a matrix that cannot be inverted")
 
 
-class Clip(Record):
+class Clip(Record, kw_only=True):
     """Motion sampled on every frame, in the space of each joint's parent.
 
     start : frame of the first sample.
