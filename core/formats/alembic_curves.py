@@ -1,23 +1,4 @@
-"""Grooms as Alembic curves (.abc) with Unreal's groom schema 1.5: written for every other program, read from any.
-
-What is written (source: Epic, "Alembic for Grooms Specification", and how the engine's importer reads it)::
-
-    /<name>            Xform    user properties groom_version_major = 1, groom_version_minor = 5 (int16),
-                                groom_tool, groom_properties (string)
-    /<name>/guides     Curves   every guide       groom_guide = 1
-    /<name>/children   Curves   every hair        groom_guide = 0, groom_closest_guides, groom_guide_weights
-    /<name>/mesh       PolyMesh where the caller gives one
-
-Parameters of the curves: ``groom_guide`` int16 and ``groom_group_id`` int32, constant; ``groom_id`` int32,
-``groom_root_uv`` float[2], ``groom_closest_guides`` int32[3] (values of ``groom_id`` of the guides) and
-``groom_guide_weights`` float[3], uniform; ``groom_width`` float and ``groom_color`` float[3], vertex.
-
-Curves are linear and non-periodic, root first, with native widths (diameters). Alembic knows no units: points
-and native widths are in ``metres_per_unit`` (metres unless told otherwise, which is what Blender and Houdini
-assume; for Unreal write 0.01, or import with a scale of 100), Y up unless told. ``groom_width`` is always in
-centimetres: Unreal takes it as it is, unscaled. Our reader finds the unit and the axis in two further user
-properties, ``filoplume_metres_per_unit`` (double) and ``filoplume_up`` (string).
-"""
+"""Curves of Alembic archives (.abc) of any program; see ``alembic_write`` for the schema of our own."""
 
 from __future__ import annotations
 
@@ -28,122 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
-from core.formats.file_space import from_metres_y_up, scaled
-from core.formats.raw_curves import OnCurve, RawCurves, clean, pack, spread
-from core.groom.strands import GroomStrands, Strands
-from core.mesh.mesh import Mesh
+from core.formats.file_space import scaled
+from core.formats.raw_curves import OnCurve, RawCurves, as_ids, clean, on_points, pack, scale_of, spread
 
 SUFFIXES = (".abc",)
-SCHEMA = (1, 5)
-CENTIMETRES = 0.01
 SCOPES = {"con": "constant", "uni": "uniform", "var": "varying", "vtx": "vertex", "fvr": "varying"}
-
-
-def write(path: Path, groom: GroomStrands, mesh: Mesh | None, up: str, metres_per_unit: float, maker: str) -> None:
-    """Write `groom` (and `mesh` beside it) as an Ogawa archive at `path`.
-
-    Parameters
-    ----------
-    up : "y" or "z"; metres_per_unit : of points and native widths. maker : name and version of the program.
-    """
-    from alembic3d import Abc, AbcGeom
-
-    archive = Abc.CreateArchiveWithInfo(str(path), maker, groom.name)
-    parent = AbcGeom.OXform(archive.getTop(), groom.name.replace("/", "_") or "groom")
-    said = parent.getSchema().getUserProperties()
-    Abc.OInt16Property(said, "groom_version_major").setValue(SCHEMA[0])
-    Abc.OInt16Property(said, "groom_version_minor").setValue(SCHEMA[1])
-    Abc.OStringProperty(said, "groom_tool").setValue(maker)
-    Abc.OStringProperty(said, "groom_properties").setValue("")
-    Abc.ODoubleProperty(said, "filoplume_metres_per_unit").setValue(metres_per_unit)
-    Abc.OStringProperty(said, "filoplume_up").setValue(up)
-    Abc.OStringProperty(said, "filoplume_name").setValue(groom.name)
-    for role, strands in (("guides", groom.guides), ("children", groom.children)):
-        if strands is not None:
-            _write_curves(parent, strands, role, up, metres_per_unit)
-    if mesh is not None:
-        _write_mesh(parent, mesh, up, metres_per_unit)
-
-
-def _write_curves(parent: Any, strands: Strands, role: str, up: str, metres_per_unit: float) -> None:
-    import imath
-    from alembic3d import AbcGeom as Geom
-
-    scope = Geom.GeometryScope
-    schema = Geom.OCurves(parent, role).getSchema()
-    widths = Geom.OFloatGeomParamSample()
-    if strands.widths is not None:
-        diameters = scaled(strands.widths, metres_per_unit, divide=True)
-        widths = Geom.OFloatGeomParamSample(_lend(imath.FloatArrayFromBuffer, diameters), scope.kVertexScope)
-    sample = Geom.OCurvesSchemaSample(
-        _lend(imath.V3fArrayFromBuffer, from_metres_y_up(strands.points, metres_per_unit, up)),
-        _lend(imath.IntArrayFromBuffer, strands.counts),
-        Geom.CurveType.kLinear, Geom.CurvePeriodicity.kNonPeriodic, widths, Geom.OV2fGeomParamSample(),
-        Geom.ON3fGeomParamSample(), Geom.BasisType.kNoBasis,
-    )  # fmt: skip
-    schema.set(sample)
-    params = schema.getArbGeomParams()
-
-    def param(kind: str, name: str, where: Any, values: Any) -> None:
-        made = getattr(Geom, f"O{kind}GeomParam")(params, name, False, where, 1)
-        made.set(getattr(Geom, f"O{kind}GeomParamSample")(values, where))
-
-    guide, group = imath.ShortArray(1), imath.IntArray(1)
-    guide[0], group[0] = int(role == "guides"), 0
-    param("Int16", "groom_guide", scope.kConstantScope, guide)
-    param("Int32", "groom_group_id", scope.kConstantScope, group)
-    if strands.ids is not None:
-        param("Int32", "groom_id", scope.kUniformScope, _lend(imath.IntArrayFromBuffer, strands.ids))
-    if strands.root_uvs is not None:
-        param("V2f", "groom_root_uv", scope.kUniformScope, _lend(imath.V2fArrayFromBuffer, strands.root_uvs))
-    if strands.guide_ids is not None and strands.guide_weights is not None:
-        lent = _lend(imath.V3iArrayFromBuffer, strands.guide_ids), _lend(imath.V3fArrayFromBuffer, strands.guide_weights)
-        param("V3i", "groom_closest_guides", scope.kUniformScope, lent[0])
-        param("V3f", "groom_guide_weights", scope.kUniformScope, lent[1])
-    if strands.widths is not None:
-        centimetres = _lend(imath.FloatArrayFromBuffer, scaled(strands.widths, CENTIMETRES, divide=True))
-        param("Float", "groom_width", scope.kVertexScope, centimetres)
-    if strands.colors is not None:
-        param("C3f", "groom_color", scope.kVertexScope, _color_array(strands.colors))
-
-
-def _lend(from_buffer: Any, array: NDArray[Any]) -> Any:
-    """An imath array of the rows of `array`; an empty one where there are none (buffers of nothing are refused)."""
-    import imath
-
-    if len(array):
-        return from_buffer(np.ascontiguousarray(array))
-    return getattr(imath, from_buffer.__name__.removesuffix("FromBuffer"))(0)
-
-
-def _color_array(colors: NDArray[Any]) -> Any:
-    import imath
-
-    made = imath.C3fArray(len(colors))
-    if len(colors):
-        np.asarray(made)[:] = colors
-    return made
-
-
-def _write_mesh(parent: Any, mesh: Mesh, up: str, metres_per_unit: float) -> None:
-    import imath
-    from alembic3d import AbcGeom as Geom
-
-    uvs = Geom.OV2fGeomParamSample()
-    # Alembic winds its faces the other way round
-    order = np.repeat(mesh.starts + mesh.counts - 1, mesh.counts) - (
-        np.arange(len(mesh.corners)) - np.repeat(mesh.starts, mesh.counts)
-    )
-    if mesh.uvs is not None:
-        uvs = Geom.OV2fGeomParamSample(
-            _lend(imath.V2fArrayFromBuffer, mesh.uvs[order]), Geom.GeometryScope.kFacevaryingScope
-        )
-    points = from_metres_y_up(mesh.points, metres_per_unit, up)
-    sample = Geom.OPolyMeshSchemaSample(
-        _lend(imath.V3fArrayFromBuffer, points), _lend(imath.IntArrayFromBuffer, mesh.corners[order]),
-        _lend(imath.IntArrayFromBuffer, mesh.counts), uvs,
-    )  # fmt: skip
-    Geom.OPolyMesh(parent, "mesh").getSchema().set(sample)
 
 
 def read_in_child(path: str) -> dict[str, Any]:
@@ -226,15 +96,15 @@ def _read_curves(schema: Any, where: str, world: NDArray[np.float64], notes: lis
         points = (points @ world[:3, :3] + world[3, :3]).astype(np.float32)
     raw = RawCurves(counts=shape.counts, points=shape.vertex(points))
     params = _array_params(schema.getArbGeomParams())
-    raw.widths = _on_points(*_widths(schema), shape)
+    widths, scope = _widths(schema)
+    raw.widths = on_points(widths, scope, shape)
     if raw.widths is not None:  # a diameter grows with the mean scale of its transform
-        raw.widths = scaled(raw.widths, abs(float(np.linalg.det(world[:3, :3]))) ** (1 / 3))
-    raw.colors = _on_points(*params.get("groom_color", (None, "")), shape)
-    if raw.colors is not None and raw.colors.shape[1:] != (3,):
-        raw.colors = None
-    raw.ids = _per_curve(params, "groom_id", len(counts), ())
+        raw.widths = scaled(raw.widths, scale_of(world))
+    colors, scope = params.get("groom_color", (None, ""))
+    raw.colors = on_points(colors, scope, shape) if colors is not None and colors.shape[1:] == (3,) else None
+    raw.ids = as_ids(_per_curve(params, "groom_id", len(counts), ()))
     raw.root_uvs = _per_curve(params, "groom_root_uv", len(counts), (2,))
-    raw.guide_ids = _per_curve(params, "groom_closest_guides", len(counts), (3,))
+    raw.guide_ids = as_ids(_per_curve(params, "groom_closest_guides", len(counts), (3,)))
     raw.guide_weights = _per_curve(params, "groom_guide_weights", len(counts), (3,))
     marks, scope = params.get("groom_guide", (None, ""))
     if marks is None or marks.ndim != 1:
@@ -262,28 +132,30 @@ def _select(raw: RawCurves, rows: NDArray[Any], guides: bool) -> RawCurves:
 
 
 def _basis(sample: Any, where: str, notes: list[str]) -> str:
-    kind, basis = str(sample.getType()), str(sample.getBasis())
-    if kind.endswith("kLinear"):
-        return "linear"
+    kind, basis = _word(sample.getType()), _word(sample.getBasis())
     known = {"kBezierBasis": "bezier", "kBsplineBasis": "bspline", "kCatmullromBasis": "catmullRom"}
-    if kind.endswith("kCubic") and basis.split(".")[-1] in known:
-        return known[basis.split(".")[-1]]
-    if not basis.endswith("kNoBasis"):
+    if kind == "kCubic" and basis in known:
+        return known[basis]
+    if kind != "kLinear" and basis != "kNoBasis":
         notes.append(f"{where} has a basis that is not evaluated; its control points were taken as they are.")
     return "linear"
 
 
 def _wrap(sample: Any) -> str:
-    return "periodic" if str(sample.getWrap()).endswith("kPeriodic") else "nonperiodic"
+    return "periodic" if _word(sample.getWrap()) == "kPeriodic" else "nonperiodic"
+
+
+def _word(value: Any) -> str:
+    """The bare name of a value of one of Alembic's enumerations."""
+    return str(value).rpartition(".")[2]
 
 
 def _widths(schema: Any) -> tuple[NDArray[Any] | None, str]:
     param = schema.getWidthsParam()
     if not param.valid() or not param.getNumSamples():
         return None, ""
-    scope = str(param.getScope()).split(".")[-1]
     named = {"kConstantScope": "con", "kUniformScope": "uni", "kVaryingScope": "var", "kFacevaryingScope": "fvr"}
-    return np.array(param.getExpandedValue().getVals(), np.float32), SCOPES[named.get(scope, "vtx")]
+    return np.array(param.getExpandedValue().getVals(), np.float32), SCOPES[named.get(_word(param.getScope()), "vtx")]
 
 
 def _array_params(params: Any) -> dict[str, tuple[NDArray[Any], str]]:
@@ -296,7 +168,7 @@ def _array_params(params: Any) -> dict[str, tuple[NDArray[Any], str]]:
     for k in range(params.getNumProperties()):
         header = params.getPropertyHeader(k)
         name, scope = header.getName(), SCOPES.get(header.getMetaData().get("geoScope"), "vertex")
-        if not name.startswith("groom_") or str(header.getDataType().getPod()).endswith("kStringPOD"):
+        if not name.startswith("groom_") or _word(header.getDataType().getPod()) == "kStringPOD":
             continue
         if header.isArray():
             values = np.array(Abc.IArrayProperty(params, name).getValue())
@@ -304,7 +176,7 @@ def _array_params(params: Any) -> dict[str, tuple[NDArray[Any], str]]:
             inside = Abc.ICompoundProperty(params, name)
             palette = np.array(Abc.IArrayProperty(inside, ".vals").getValue())
             rows = np.array(Abc.IArrayProperty(inside, ".indices").getValue(), np.int64)
-            if len(rows) and not (0 <= rows.min() and rows.max() < len(palette)):
+            if len(rows) and (rows.min() < 0 or rows.max() >= len(palette)):
                 continue
             values = palette[rows]
         else:
@@ -321,16 +193,3 @@ def _per_curve(
     if values is None or scope == "constant" or values.shape != (rows, *width):
         return None
     return values.astype(np.float32 if values.dtype.kind == "f" else np.int64)
-
-
-def _on_points(values: NDArray[Any] | None, scope: str, shape: OnCurve) -> NDArray[Any] | None:
-    if values is None or not len(values):
-        return None
-    if scope == "varying":
-        on_joints = shape.varying(values)
-        if on_joints is not None:
-            return on_joints
-        scope = "vertex"
-    if scope == "vertex":
-        return shape.vertex(values) if len(values) == int(shape.given.sum()) else None
-    return spread(values, scope, shape.counts)

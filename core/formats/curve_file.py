@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from core.errors import UserError
-from core.formats import alembic_curves, hair, tressfx, usd_curves
+from core.formats import alembic_curves, alembic_write, hair, tressfx, usd_curves
 from core.formats.atomic import atomic_write
 from core.formats.file_space import axis_of, metres_of, scaled, to_metres_y_up
 from core.formats.sandbox import run_bounded
@@ -34,7 +34,7 @@ class Format(NamedTuple):
 FORMATS: dict[str, Format] = {
     **dict.fromkeys(usd_curves.SUFFIXES, Format("USD", usd_curves.write, usd_curves.read_in_child, True)),
     **dict.fromkeys(
-        alembic_curves.SUFFIXES, Format("Alembic", alembic_curves.write, alembic_curves.read_in_child, True)
+        alembic_curves.SUFFIXES, Format("Alembic", alembic_write.write, alembic_curves.read_in_child, True)
     ),
     **dict.fromkeys(hair.SUFFIXES, Format("Cem Yuksel hair", hair.write, hair.read, False)),
     **dict.fromkeys(tressfx.SUFFIXES, Format("TressFX", None, tressfx.read, False)),
@@ -169,11 +169,11 @@ def _format(path: Path) -> Format:
 def _strands(raw: dict[str, Any], role: str, metres: float, axis: str, path: Path) -> Strands | None:
     if f"{role}.counts" not in raw:
         return None
-    columns = {name: raw.get(f"{role}.{name}") for name in Strands.__struct_fields__}
+    columns: dict[str, Any] = {name: raw.get(f"{role}.{name}") for name in Strands.__struct_fields__}
     columns["points"] = to_metres_y_up(columns["points"], metres, axis)
     if columns["widths"] is not None:
         columns["widths"] = scaled(columns["widths"], metres)
-    frozen = {name: None if values is None else freeze(values) for name, values in columns.items()}
+    frozen: dict[str, Any] = {name: None if values is None else freeze(values) for name, values in columns.items()}
     try:
         return Strands(**frozen)
     except ValueError as error:

@@ -46,7 +46,7 @@ def write(path: Path, groom: GroomStrands, mesh: Mesh | None, up: str, metres_pe
         raise UserError("This groom has neither hairs nor guides to write.")
     segments = strands.counts - 1
     if len(segments) and segments.max() > MOST_SEGMENTS:
-        raise UserError(f"A .hair file cannot hold a strand of more than {MOST_SEGMENTS + 1} points; write .usdc instead.")
+        raise UserError(f"A .hair file cannot hold a strand of {segments.max() + 1} points; write .usdc instead.")
     same = len(segments) > 0 and bool((segments == segments[0]).all())
     widths = None if strands.widths is None else scaled(strands.widths, metres_per_unit, divide=True)
     arrays = POINTS | (0 if same else SEGMENTS) | (THICKNESS if widths is not None else 0)

@@ -168,6 +168,37 @@ def _with_phantoms(values: NDArray[Any], counts: NDArray[Any]) -> tuple[NDArray[
     return out, padded
 
 
+def on_points(values: NDArray[Any] | None, scope: str, shape: OnCurve) -> NDArray[Any] | None:
+    """Values of any scope ("constant", "uniform", "varying", "faceVarying", "vertex") as one per kept point.
+
+    None when there are none, or their number fits nothing.
+    """
+    if values is None or not len(values):
+        return None
+    if scope in ("varying", "faceVarying"):
+        on_joints = shape.varying(values)
+        if on_joints is not None:
+            return on_joints
+        scope = "vertex"  # a common slip: one value per point, called varying
+    if scope == "vertex":
+        return shape.vertex(values) if len(values) == int(shape.given.sum()) else None
+    return spread(values, scope, shape.counts)
+
+
+def as_ids(values: NDArray[Any] | None) -> NDArray[np.int32] | None:
+    """Whole numbers that fit int32, or None."""
+    if values is None:
+        return None
+    whole = np.asarray(values, np.float64)
+    fits = np.isfinite(whole).all() and (np.abs(whole) < 2**31).all() and (whole == np.round(whole)).all()
+    return whole.astype(np.int32) if fits else None
+
+
+def scale_of(world: NDArray[np.float64]) -> float:
+    """How much a diameter grows in the (4, 4) transform `world`: the mean of its scales."""
+    return abs(float(np.linalg.det(world[:3, :3]))) ** (1 / 3)
+
+
 def clean(raw: RawCurves, where: str) -> RawCurves:
     """Leave out curves of fewer than 2 points or with values that are not numbers; say so in the notes."""
     counts = raw.counts
@@ -215,7 +246,8 @@ def merge(bundles: Sequence[RawCurves]) -> RawCurves:
 
 def pack(bundles: Sequence[RawCurves], **values: Any) -> dict[str, Any]:
     """Arrays named "guides.points", "children.counts" ... beside the given plain values and "notes"."""
-    answer: dict[str, Any] = {**values, "notes": list(values.get("notes", []))}
+    answer: dict[str, Any] = dict(values)
+    notes = list(answer.pop("notes", []))
     for role, guides in (("guides", True), ("children", False)):
         chosen = [b for b in bundles if b.guides is guides and len(b.counts)]
         if not chosen:
@@ -224,6 +256,7 @@ def pack(bundles: Sequence[RawCurves], **values: Any) -> dict[str, Any]:
         if raw.ids is not None and len(np.unique(raw.ids)) != len(raw.ids):
             raw.notes.append(f"The ids of the {role} are not unique; they were left out.")
             raw.ids = None
+        notes += raw.notes
         if raw.guide_ids is None or raw.guide_weights is None:
             raw.guide_ids = raw.guide_weights = None
         dtypes = {"counts": np.int32, "ids": np.int32, "guide_ids": np.int32}
@@ -231,5 +264,5 @@ def pack(bundles: Sequence[RawCurves], **values: Any) -> dict[str, Any]:
             column = getattr(raw, name)
             if column is not None:
                 answer[f"{role}.{name}"] = np.ascontiguousarray(column, dtypes.get(name, np.float32))
-    answer["notes"] += [note for bundle in bundles for note in bundle.notes if note not in answer["notes"]]
-    return answer
+    notes += [note for bundle in bundles if not len(bundle.counts) for note in bundle.notes]
+    return {**answer, "notes": notes}

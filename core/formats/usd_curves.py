@@ -18,6 +18,7 @@ no groom; a renderer's stage can deactivate the one prim.
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.formats.file_space import from_metres_y_up, scaled
-from core.formats.raw_curves import OnCurve, RawCurves, clean, pack, spread
+from core.formats.raw_curves import OnCurve, RawCurves, as_ids, clean, on_points, pack, scale_of
 from core.groom.strands import GroomStrands, Strands
 from core.mesh.mesh import Mesh
 
@@ -42,13 +43,36 @@ def write(path: Path, groom: GroomStrands, mesh: Mesh | None, up: str, metres_pe
     Parameters
     ----------
     up : "y" or "z"; metres_per_unit : of the file. maker : name and version of the program, kept in customData.
+
+    Raises
+    ------
+    UserError
+        When OpenUSD could not write it (a full disk).
     """
+    from pxr import Sdf, Tf, UsdUtils
+
+    try:
+        if path.suffix.lower() != ".usdz":
+            _write_layer(path, groom, mesh, up, metres_per_unit, maker)
+            return
+        with tempfile.TemporaryDirectory(prefix="filoplume-") as folder:
+            inside = Path(folder) / "groom.usdc"
+            _write_layer(inside, groom, mesh, up, metres_per_unit, maker)
+            if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inside)), str(path)):
+                raise UserError("The groom could not be packed; write a .usdc instead.")
+    except Tf.ErrorException as error:
+        raise UserError(
+            f"The USD file could not be written to {path.parent}; free some space there or save elsewhere."
+        ) from error
+
+
+def _write_layer(
+    path: Path, groom: GroomStrands, mesh: Mesh | None, up: str, metres_per_unit: float, maker: str
+) -> None:
     from pxr import Sdf, Usd, UsdGeom
 
-    if path.suffix.lower() == ".usdz":
-        _write_package(path, groom, mesh, up, metres_per_unit, maker)
-        return
-    stage = Usd.Stage.Open(Sdf.Layer.CreateNew(str(path), args={"format": "usdc"} if path.suffix == ".usd" else {}))
+    layer = Sdf.Layer.CreateNew(str(path), args={"format": "usdc"} if path.suffix.lower() == ".usd" else {})
+    stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(stage, metres_per_unit)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if up == "z" else UsdGeom.Tokens.y)
     root = UsdGeom.Xform.Define(stage, "/Groom").GetPrim()
@@ -61,7 +85,7 @@ def write(path: Path, groom: GroomStrands, mesh: Mesh | None, up: str, metres_pe
             _write_curves(stage, parent.GetPath().AppendChild(role), strands, role, up, metres_per_unit)
     if mesh is not None:
         _write_mesh(stage, mesh, up, metres_per_unit)
-    stage.GetRootLayer().Save()
+    layer.Save()
 
 
 def _identifier(name: str) -> str:
@@ -69,20 +93,6 @@ def _identifier(name: str) -> str:
 
     made = Tf.MakeValidIdentifier(name) if name else "groom"
     return "groom_" if made == "mesh" else str(made)  # /Groom/mesh is taken
-
-
-def _write_package(
-    path: Path, groom: GroomStrands, mesh: Mesh | None, up: str, metres_per_unit: float, maker: str
-) -> None:
-    import tempfile
-
-    from pxr import Sdf, UsdUtils
-
-    with tempfile.TemporaryDirectory(prefix="filoplume-") as folder:
-        layer = Path(folder) / "groom.usdc"
-        write(layer, groom, mesh, up, metres_per_unit, maker)
-        if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(layer)), str(path)):
-            raise UserError(f"{path.name} could not be packed; write a .usdc instead.")
 
 
 def _write_curves(stage: Any, path: Any, strands: Strands, role: str, up: str, metres_per_unit: float) -> None:
@@ -208,13 +218,12 @@ def _read_curves(prim: Any, time: Any, world: NDArray[np.float64], notes: list[s
     raw = RawCurves(counts=shape.counts, points=shape.vertex(points))
     raw.widths = _read_widths(curves, primvars, shape, time)
     if raw.widths is not None:  # a diameter grows with the mean scale of its transform
-        raw.widths = scaled(raw.widths, abs(float(np.linalg.det(world[:3, :3]))) ** (1 / 3))
+        raw.widths = scaled(raw.widths, scale_of(world))
     raw.colors = _per_point(primvars.GetPrimvar("displayColor"), shape, time, 3)
     raw.root_uvs = _first(primvars, UV_NAMES, len(counts), time, 2)
     ids = _first(primvars, ID_NAMES, len(counts), time, 1)
-    raw.ids = None if ids is None else _as_ids(ids[:, 0])
-    triples = _first(primvars, GUIDE_ID_NAMES, len(counts), time, 3)
-    raw.guide_ids = None if triples is None else _as_ids(triples)
+    raw.ids = as_ids(None if ids is None else ids[:, 0])
+    raw.guide_ids = as_ids(_first(primvars, GUIDE_ID_NAMES, len(counts), time, 3))
     raw.guide_weights = _first(primvars, GUIDE_WEIGHT_NAMES, len(counts), time, 3)
     marker = primvars.GetPrimvar("groom_guide")
     marked = np.asarray(marker.Get(time)).reshape(-1)[:1] if marker and marker.HasValue() else np.zeros(1)
@@ -230,25 +239,14 @@ def _read_widths(curves: Any, primvars: Any, shape: OnCurve, time: Any) -> NDArr
     values = curves.GetWidthsAttr().Get(time)
     if values is None:
         return None
-    return _on_points(np.array(values, np.float32), str(curves.GetWidthsInterpolation()), shape)
+    return on_points(np.array(values, np.float32), str(curves.GetWidthsInterpolation()), shape)
 
 
 def _per_point(primvar: Any, shape: OnCurve, time: Any, width: int) -> NDArray[Any] | None:
     values = _flattened(primvar, time, width)
     if values is None:
         return None
-    return _on_points(values if width > 1 else values[:, 0], str(primvar.GetInterpolation()), shape)
-
-
-def _on_points(values: NDArray[Any], scope: str, shape: OnCurve) -> NDArray[Any] | None:
-    if scope in ("varying", "faceVarying"):
-        on_joints = shape.varying(values)
-        if on_joints is not None:
-            return on_joints
-        scope = "vertex"  # a common slip: one value per point, called varying
-    if scope == "vertex":
-        return shape.vertex(values) if len(values) == int(shape.given.sum()) else None
-    return spread(values, scope, shape.counts)
+    return on_points(values if width > 1 else values[:, 0], str(primvar.GetInterpolation()), shape)
 
 
 def _first(primvars: Any, names: tuple[str, ...], rows: int, time: Any, width: int) -> NDArray[Any] | None:
@@ -268,10 +266,3 @@ def _flattened(primvar: Any, time: Any, width: int) -> NDArray[Any] | None:
     if values.dtype.kind not in "iuf" or values.size == 0 or values.size % width:
         return None
     return values.reshape(-1, width).astype(np.float32 if values.dtype.kind == "f" else np.int64)
-
-
-def _as_ids(values: NDArray[Any]) -> NDArray[np.int32] | None:
-    """Whole numbers that fit int32, or None."""
-    whole = np.asarray(values, np.float64)
-    fits = np.isfinite(whole).all() and (np.abs(whole) < 2**31).all() and (whole == np.round(whole)).all()
-    return whole.astype(np.int32) if fits else None
