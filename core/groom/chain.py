@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def read_chain(points, row, x, q, lengths):  # type: ignore[no-untyped-def]
     """Read strand `row` of `points` (N, P, 3) float32 into float64 scratch; returns its quantum in metres.
 
@@ -57,7 +57,7 @@ def read_chain(points, row, x, q, lengths):  # type: ignore[no-untyped-def]
     return quantum
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def rebuild_chain(x, q, lengths, first):  # type: ignore[no-untyped-def]
     """Lay the points of segments `first` .. end one after another: x[j+1] = x[j] + lengths[j] q[j]."""
     for j in range(first, lengths.shape[0]):
@@ -65,7 +65,7 @@ def rebuild_chain(x, q, lengths, first):  # type: ignore[no-untyped-def]
             x[j + 1, k] = x[j, k] + lengths[j] * q[j, k]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def write_chain(points, row, x, lengths, first, quantum):  # type: ignore[no-untyped-def]
     """Store x[first + 1:] in float32 so that each segment is read back with the same length.
 
@@ -99,7 +99,7 @@ def write_chain(points, row, x, lengths, first, quantum):  # type: ignore[no-unt
         points[row, j + 1, 0], points[row, j + 1, 1], points[row, j + 1, 2] = cx, cy, cz
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def first_free(hold, row, freedom):  # type: ignore[no-untyped-def]
     """How far each segment may be turned, 0 .. 1, into `freedom` (P - 1,); returns the first free segment.
 

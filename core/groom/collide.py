@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit, types
@@ -13,74 +12,22 @@ from numpy.typing import NDArray
 from core.groom.chain import first_free, read_chain, rebuild_chain, write_chain
 from core.groom.guides import Guides
 from core.groom.region import editable
+from core.mesh.distance_field import DistanceField, sample_field, sample_gradient
 from core.record import freeze
 from core.workers import serial_ranges
-
-if TYPE_CHECKING:
-    from core.mesh.distance_field import DistanceField
 
 Ranges = Callable[[int, Callable[[int, int], object]], None]
 
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 F32_3D = types.Array(types.float32, 3, "C", readonly=True)
-NO_FIELD = freeze(np.zeros((0, 0, 0), np.float32))
+F64_1D = types.Array(types.float64, 1, "C", readonly=True)
+NO_FIELD = DistanceField(freeze(np.zeros(3)), 1.0, 0.0, freeze(np.zeros((0, 0, 0), np.float32)))
 REPEATS = 4
+LEAST_GRADIENT = 0.3  # a distance grows by 1 per metre; less is the flat rest beyond the band, or a ridge
 
 
-@njit(cache=True, nogil=True)
-def field_value(values, ox, oy, oz, inverse_cell, px, py, pz):  # type: ignore[no-untyped-def]
-    """Signed distance at one point, trilinear; outside the grid that of its border plus the way there."""
-    fx, fy, fz = (px - ox) * inverse_cell, (py - oy) * inverse_cell, (pz - oz) * inverse_cell
-    nx, ny, nz = values.shape
-    cx = min(max(fx, 0.0), nx - 1.000001)
-    cy = min(max(fy, 0.0), ny - 1.000001)
-    cz = min(max(fz, 0.0), nz - 1.000001)
-    i, j, k = int(cx), int(cy), int(cz)
-    a, b, c = cx - i, cy - j, cz - k
-    v00 = values[i, j, k] * (1.0 - c) + values[i, j, k + 1] * c
-    v01 = values[i, j + 1, k] * (1.0 - c) + values[i, j + 1, k + 1] * c
-    v10 = values[i + 1, j, k] * (1.0 - c) + values[i + 1, j, k + 1] * c
-    v11 = values[i + 1, j + 1, k] * (1.0 - c) + values[i + 1, j + 1, k + 1] * c
-    inside = (v00 * (1.0 - b) + v01 * b) * (1.0 - a) + (v10 * (1.0 - b) + v11 * b) * a
-    dx, dy, dz = fx - cx, fy - cy, fz - cz
-    beyond = dx * dx + dy * dy + dz * dz
-    if beyond > 1e-8:
-        return inside + math.sqrt(beyond) / inverse_cell
-    return inside
-
-
-@njit(cache=True, nogil=True)
-def field_normal(values, ox, oy, oz, inverse_cell, px, py, pz):  # type: ignore[no-untyped-def]
-    """Signed distance and unit outward normal at one point: (d, nx, ny, nz); a zero normal where the field is flat."""
-    fx, fy, fz = (px - ox) * inverse_cell, (py - oy) * inverse_cell, (pz - oz) * inverse_cell
-    nx, ny, nz = values.shape
-    cx = min(max(fx, 0.0), nx - 1.000001)
-    cy = min(max(fy, 0.0), ny - 1.000001)
-    cz = min(max(fz, 0.0), nz - 1.000001)
-    i, j, k = int(cx), int(cy), int(cz)
-    a, b, c = cx - i, cy - j, cz - k
-    p000, p001 = np.float64(values[i, j, k]), np.float64(values[i, j, k + 1])
-    p010, p011 = np.float64(values[i, j + 1, k]), np.float64(values[i, j + 1, k + 1])
-    p100, p101 = np.float64(values[i + 1, j, k]), np.float64(values[i + 1, j, k + 1])
-    p110, p111 = np.float64(values[i + 1, j + 1, k]), np.float64(values[i + 1, j + 1, k + 1])
-    v00, v01 = p000 * (1.0 - c) + p001 * c, p010 * (1.0 - c) + p011 * c
-    v10, v11 = p100 * (1.0 - c) + p101 * c, p110 * (1.0 - c) + p111 * c
-    v0, v1 = v00 * (1.0 - b) + v01 * b, v10 * (1.0 - b) + v11 * b
-    gx = v1 - v0
-    gy = (v01 - v00) * (1.0 - a) + (v11 - v10) * a
-    gz = ((p001 - p000) * (1.0 - b) + (p011 - p010) * b) * (1.0 - a) + (
-        (p101 - p100) * (1.0 - b) + (p111 - p110) * b
-    ) * a
-    size = math.sqrt(gx * gx + gy * gy + gz * gz) * inverse_cell
-    value = v0 * (1.0 - a) + v1 * a
-    if size < 0.3:  # a true distance changes by 1 per metre; this is the flat rest beyond the band, or a ridge
-        return value, 0.0, 0.0, 0.0
-    size = inverse_cell / size
-    return value, gx * size, gy * size, gz * size
-
-
-@njit(cache=True, nogil=True)
-def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, clearance, move):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def collide_chain(x, q, lengths, first, values, origin, cell, clearance, move):  # type: ignore[no-untyped-def]
     """Lift segments `first` .. end of one chain off the skin, root to tip, lengths kept; returns the lowest distance.
 
     Each segment is sampled at its end and between, at most a cell of the grid apart, unless both ends are so far out
@@ -90,14 +37,13 @@ def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, cleara
     With `move` False nothing is changed, only measured.
     """
     count = lengths.shape[0]
-    cell = 1.0 / inverse_cell
-    at_root = field_value(values, ox, oy, oz, inverse_cell, x[0, 0], x[0, 1], x[0, 2])
+    at_root = sample_field(values, origin, cell, x[0, 0], x[0, 1], x[0, 2])
     at_root = min(max(at_root, -2.0 * cell), 2.0 * cell)
-    fade = 0.25 * inverse_cell
+    fade = 0.25 / cell
     arc = 0.0
     for j in range(first):
         arc += lengths[j]
-    before = field_value(values, ox, oy, oz, inverse_cell, x[first, 0], x[first, 1], x[first, 2])
+    before = sample_field(values, origin, cell, x[first, 0], x[first, 1], x[first, 2])
     before -= at_root * max(0.0, 1.0 - arc * fade)
     ramp = max(lengths[0], 1e-12)
     lowest = np.inf
@@ -106,7 +52,7 @@ def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, cleara
         if length <= 0.0:
             x[j + 1, 0], x[j + 1, 1], x[j + 1, 2] = x[j, 0], x[j, 1], x[j, 2]
             continue
-        pieces = min(8, max(2, int(length * inverse_cell) + 1))
+        pieces = min(8, max(2, int(length / cell) + 1))
         at_end = 0.0
         here = np.inf
         for repeat in range(REPEATS + 1):
@@ -115,8 +61,8 @@ def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, cleara
             for piece in range(pieces, 0, -1):
                 t = piece / pieces
                 s = arc + t * length
-                d = field_value(
-                    values, ox, oy, oz, inverse_cell,
+                d = sample_field(
+                    values, origin, cell,
                     x[j, 0] + t * length * q[j, 0], x[j, 1] + t * length * q[j, 1], x[j, 2] + t * length * q[j, 2],
                 ) - at_root * max(0.0, 1.0 - s * fade)
                 need = clearance * min(1.0, s / ramp)
@@ -130,12 +76,14 @@ def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, cleara
             if worst <= 1e-6 * length or repeat == REPEATS or not move:
                 break
             step = worst_t * length
-            _, nx, ny, nz = field_normal(
-                values, ox, oy, oz, inverse_cell,
+            _, nx, ny, nz = sample_gradient(
+                values, origin, cell,
                 x[j, 0] + step * q[j, 0], x[j, 1] + step * q[j, 1], x[j, 2] + step * q[j, 2],
             )
-            if nx * nx + ny * ny + nz * nz < 0.5:
+            size = math.sqrt(nx * nx + ny * ny + nz * nz)
+            if size < LEAST_GRADIENT:
                 break
+            nx, ny, nz = nx / size, ny / size, nz / size
             rise = q[j, 0] * nx + q[j, 1] * ny + q[j, 2] * nz
             tx, ty, tz = q[j, 0] - rise * nx, q[j, 1] - rise * ny, q[j, 2] - rise * nz
             along = tx * tx + ty * ty + tz * tz
@@ -160,11 +108,11 @@ def collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, cleara
 @njit(
     types.void(
         types.int64, types.int64, types.float32[:, :, ::1], F32_2D, types.Array(types.bool_, 1, "C", readonly=True),
-        F32_3D, types.float64, types.float64, types.float64, types.float64, types.float64,
+        F32_3D, F64_1D, types.float64, types.float64,
     ),
-    cache=True, nogil=True,
+    cache=True, nogil=True, error_model="numpy",
 )
-def _push_out_rows(start, stop, points, hold, edit, values, ox, oy, oz, inverse_cell, clearance):  # type: ignore[no-untyped-def]
+def _push_out_rows(start, stop, points, hold, edit, values, origin, cell, clearance):  # type: ignore[no-untyped-def]
     count = points.shape[1]
     x, q, lengths = np.empty((count, 3)), np.empty((count - 1, 3)), np.empty(count - 1)
     freedom = np.empty(count - 1)
@@ -177,27 +125,27 @@ def _push_out_rows(start, stop, points, hold, edit, values, ox, oy, oz, inverse_
         quantum = read_chain(points, row, x, q, lengths)
         total = lengths.sum()
         gap = clearance * total
-        low = collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, gap, False)
+        low = collide_chain(x, q, lengths, first, values, origin, cell, gap, False)
         if low >= 0.5 * gap * (lengths[0] / total if first == 0 and total > 0.0 else 1.0):
             continue
-        collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, gap, True)
+        collide_chain(x, q, lengths, first, values, origin, cell, gap, True)
         rebuild_chain(x, q, lengths, first)
         write_chain(points, row, x, lengths, first, quantum)
 
 
 @njit(
     types.void(
-        types.int64, types.int64, F32_3D, F32_3D, types.float64, types.float64, types.float64, types.float64,
+        types.int64, types.int64, F32_3D, F32_3D, F64_1D, types.float64,
         types.float64[::1],
     ),
-    cache=True, nogil=True,
+    cache=True, nogil=True, error_model="numpy",
 )
-def _lowest_rows(start, stop, points, values, ox, oy, oz, inverse_cell, out):  # type: ignore[no-untyped-def]
+def _lowest_rows(start, stop, points, values, origin, cell, out):  # type: ignore[no-untyped-def]
     count = points.shape[1]
     x, q, lengths = np.empty((count, 3)), np.empty((count - 1, 3)), np.empty(count - 1)
     for row in range(start, stop):
         read_chain(points, row, x, q, lengths)
-        out[row] = collide_chain(x, q, lengths, 0, values, ox, oy, oz, inverse_cell, 0.0, False)
+        out[row] = collide_chain(x, q, lengths, 0, values, origin, cell, 0.0, False)
 
 
 def push_out(
@@ -214,9 +162,8 @@ def push_out(
     """
     edit = editable(guides) if mask is None else editable(guides) & mask
     points = guides.points.copy()
-    ox, oy, oz, inverse_cell = field_numbers(field)
     ranges(len(guides), lambda a, b: _push_out_rows(
-        a, b, points, guides.hold, edit, field.values, ox, oy, oz, inverse_cell, float(clearance)))
+        a, b, points, guides.hold, edit, field.values, field.origin, field.cell, float(clearance)))
     return guides.replace(points=freeze(points))
 
 
@@ -228,13 +175,6 @@ def lowest_distances(
     Distances count from that of the root, which lies on the skin (see :func:`collide_chain`).
     """
     out = np.full(len(points), np.inf)
-    ox, oy, oz, inverse_cell = field_numbers(field)
-    ranges(len(points), lambda a, b: _lowest_rows(a, b, points, field.values, ox, oy, oz, inverse_cell, out))
+    ranges(len(points), lambda a, b: _lowest_rows(a, b, points, field.values, field.origin, field.cell, out))
     return out
 
-
-def field_numbers(field: DistanceField | None) -> tuple[float, float, float, float]:
-    """Origin x, y, z and the inverse of the cell of a field, as kernels take them (zeros for none)."""
-    if field is None:
-        return 0.0, 0.0, 0.0, 0.0
-    return float(field.origin[0]), float(field.origin[1]), float(field.origin[2]), 1.0 / float(field.cell)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from core.errors import UserError
-from core.groom.collide import NO_FIELD, Ranges, field_numbers
+from core.groom.collide import NO_FIELD, Ranges
 from core.groom.comb_kernel import comb_rows
 from core.groom.guides import Guides
 from core.groom.region import View, editable
+from core.mesh.distance_field import DistanceField
 from core.record import freeze
 from core.workers import serial_ranges
-
-if TYPE_CHECKING:
-    from core.mesh.distance_field import DistanceField
 
 # What strength 1 of the two parts means in the kernel (tuned on tests/bench/comb_targets.py).
 GRIP = 0.9
@@ -79,16 +76,15 @@ def comb(
         return guides
     points = guides.points.copy()
     touched = np.zeros(len(guides), np.bool_)
-    values = NO_FIELD if field is None else field.values
+    skin = NO_FIELD if field is None else field
     clip = np.array(view.clip_from_object, np.float64, order="C")
     basis = view.motion_basis()
-    numbers = field_numbers(field)
 
     def rows(start: int, stop: int) -> None:
         comb_rows(
             start, stop, points, guides.hold, guides.roots.frames, reach, clip, basis, float(view.width),
             float(view.height), way, float(radius), GRIP * grip, LAY * lay, float(flat), float(tip_first), float(lift),
-            float(max_bend), values, *numbers, float(clearance), touched,
+            float(max_bend), skin.values, skin.origin, float(skin.cell), float(clearance), touched,
         )
 
     ranges(len(guides), rows)

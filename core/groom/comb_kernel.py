@@ -19,17 +19,19 @@ from numba import njit, types
 
 from core.falloff import smoothstep1
 from core.groom.chain import first_free, read_chain, rebuild_chain, write_chain
-from core.groom.collide import F32_2D, F32_3D, collide_chain, field_normal
+from core.groom.collide import F32_2D, F32_3D, F64_1D, LEAST_GRADIENT, collide_chain
+from core.mesh.distance_field import sample_gradient
 
 STEP = 0.12  # of the radius
 SPREAD = 0.43  # compliance of joints outside the ring
 CARRY = 0.9  # how much of the lay goes on beyond the ring, from joint to joint
+TRAIL = 1.0  # how much less hair is laid behind the ring's centre, which would have it lag in the curves of a stroke
 STIFFNESS = 0.02  # regularises the 3 x 3 system of the grip
 MAX_TURN = 0.5  # radians a segment may turn by the grip in one step
 f64 = types.float64
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _turn(q, j, hx, hy, hz):  # type: ignore[no-untyped-def]
     """Rotate q[j] by the rotation vector h, |h| up to MAX_TURN (Cayley form: exact length, no trigonometry)."""
     hx, hy, hz = 0.5 * hx, 0.5 * hy, 0.5 * hz
@@ -40,7 +42,7 @@ def _turn(q, j, hx, hy, hz):  # type: ignore[no-untyped-def]
     q[j, 2] += s * (cz + hx * cy - hy * cx)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _grip(x, q, w, arcs, freedom, dx, dy, dz, turn):  # type: ignore[no-untyped-def]
     """Turn the joints so that the contact moves by (dx, dy, dz), less its part along the strand."""
     joints = q.shape[0]
@@ -106,7 +108,7 @@ def _grip(x, q, w, arcs, freedom, dx, dy, dz, turn):  # type: ignore[no-untyped-
             _turn(q, j, cap * sx, cap * sy, cap * sz)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _lay(q, j, vx, vy, vz, nx, ny, nz, rate):  # type: ignore[no-untyped-def]
     """Turn q[j] toward the unit vector v: the tangent of half the angle shrinks by exp(-rate)."""
     c = q[j, 0] * vx + q[j, 1] * vy + q[j, 2] * vz
@@ -131,7 +133,7 @@ def _lay(q, j, vx, vy, vz, nx, ny, nz, rate):  # type: ignore[no-untyped-def]
     q[j, 0], q[j, 1], q[j, 2] = along * vx + across * ex, along * vy + across * ey, along * vz + across * ez
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _limit_bends(q, first, limits):  # type: ignore[no-untyped-def]
     """Open every joint from segment `first` on that is folded more than its limit (a cosine), root to tip."""
     for j in range(max(1, first), q.shape[0]):
@@ -153,26 +155,26 @@ def _limit_bends(q, first, limits):  # type: ignore[no-untyped-def]
     types.void(
         types.int64, types.int64, types.float32[:, :, ::1], F32_2D, F32_3D,
         types.Array(types.float32, 1, "C", readonly=True), types.float64[:, ::1], types.float64[:, ::1], f64, f64,
-        types.float64[:, ::1], f64, f64, f64, f64, f64, f64, f64, F32_3D, f64, f64, f64, f64, f64,
+        types.float64[:, ::1], f64, f64, f64, f64, f64, f64, f64, F32_3D, F64_1D, f64, f64,
         types.boolean[::1],
     ),
-    cache=True, nogil=True,
+    cache=True, nogil=True, error_model="numpy",
 )
 def comb_rows(  # type: ignore[no-untyped-def]
     start, stop, points, hold, frames, reach, clip, basis, width, height, path, radius, grip, lay, flat, tip_first,
-    lift, max_bend, values, ox, oy, oz, inverse_cell, clearance, touched,
+    lift, max_bend, values, origin, cell, clearance, touched,
 ):
     """Comb rows start .. stop of `points` (G, P, 3) in place; `touched` (G,) tells which were changed.
 
     reach : (G,) strength per strand, 0 leaves it out. path : (K, 2) pixels. radius : pixels.
-    clip, basis, width, height : see core/groom/region.py View. values .. inverse_cell : field, empty for none.
+    clip, basis, width, height : see core/groom/region.py View. values, origin, cell : field, empty for none.
     max_bend : radians per joint. clearance : fraction of the strand's length. The rest: see core/groom/comb.py.
     """
     count = points.shape[1]
     joints = count - 1
     x, q, lengths = np.empty((count, 3)), np.empty((joints, 3)), np.empty(joints)
     old_x, old_q = np.empty((count, 3)), np.empty((joints, 3))
-    arcs, w = np.zeros(count), np.zeros(count)
+    arcs, w, ahead = np.zeros(count), np.zeros(count), np.zeros(count)
     freedom, limits = np.empty(joints), np.empty(joints)
     screen = np.empty((count, 2))
     bend_cosine = math.cos(max_bend)
@@ -194,7 +196,7 @@ def comb_rows(  # type: ignore[no-untyped-def]
             way = math.sqrt(way_x * way_x + way_y * way_y)
             if way <= 1e-9 * radius:
                 continue
-            steps = max(1, int(math.ceil(way / (STEP * radius) - 1e-6)))
+            steps = max(1, math.ceil(way / (STEP * radius) - 1e-6))
             step_x, step_y = way_x / steps, way_y / steps
             for step in range(steps):
                 if stale:
@@ -235,9 +237,11 @@ def comb_rows(  # type: ignore[no-untyped-def]
                     t = min(max((sx * step_x + sy * step_y) / step_2, 0.0), 1.0)
                     sx, sy = sx - t * step_x, sy - t * step_y
                     d2 = sx * sx + sy * sy
-                    w[i] = 0.0
+                    w[i] = ahead[i] = 0.0
                     if d2 < radius * radius:
                         w[i] = 1.0 - smoothstep1(flat, 1.0, math.sqrt(d2) / radius)
+                        along = (sx * step_x + sy * step_y) / math.sqrt(step_2) / radius
+                        ahead[i] = max(0.0, 1.0 + TRAIL * min(along, 0.0))
                         strongest = max(strongest, w[i])
                 if strongest <= 0.0:
                     continue
@@ -280,15 +284,17 @@ def comb_rows(  # type: ignore[no-untyped-def]
                     rate = lay * strength * math.sqrt(step_2) / radius
                     carried = 0.0
                     for j in range(joints):
-                        carried = max(0.5 * (w[j] + w[j + 1]), CARRY * carried)
+                        carried = max(0.5 * (w[j] * ahead[j] + w[j + 1] * ahead[j + 1]), CARRY * carried)
                         if carried <= 0.0 or freedom[j] <= 0.0:
                             continue
                         gap = 1e30
                         nx = ny = nz = 0.0
                         if collides:
-                            gap, nx, ny, nz = field_normal(
-                                values, ox, oy, oz, inverse_cell, x[j, 0], x[j, 1], x[j, 2])
-                        if nx == 0.0 and ny == 0.0 and nz == 0.0:
+                            gap, nx, ny, nz = sample_gradient(values, origin, cell, x[j, 0], x[j, 1], x[j, 2])
+                        size = math.sqrt(nx * nx + ny * ny + nz * nz)
+                        if size >= LEAST_GRADIENT:
+                            nx, ny, nz = nx / size, ny / size, nz / size
+                        else:
                             gap = 1e30
                             nx, ny, nz = (
                                 np.float64(frames[row, 2, 0]), np.float64(frames[row, 2, 1]),
@@ -315,9 +321,9 @@ def comb_rows(  # type: ignore[no-untyped-def]
                 rebuild_chain(x, q, lengths, first)
                 if collides:
                     room = clearance * total
-                    low = collide_chain(x, q, lengths, first, values, ox, oy, oz, inverse_cell, room, True)
+                    low = collide_chain(x, q, lengths, first, values, origin, cell, room, True)
                     if low < -0.02 * room and low < collide_chain(
-                        old_x, old_q, lengths, first, values, ox, oy, oz, inverse_cell, room, False
+                        old_x, old_q, lengths, first, values, origin, cell, room, False
                     ):
                         x[:], q[:] = old_x, old_q
                         continue

@@ -7,6 +7,7 @@ run over all parallel lanes. The error is the angle to the target, averaged over
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,43 +15,37 @@ from numpy.typing import NDArray
 
 from core.groom.guides import Guides
 from core.groom.region import View
+from core.mesh.distance_field import DistanceField
 from core.mesh.roots import Roots
 from core.record import freeze
 
 Array = NDArray[np.float64]
 BALL = 4.0  # radius of the sphere; its top is the origin
+CENTRE = np.array([0.0, 0.0, -BALL])
 PIXELS = 200.0  # per unit
 SIZE = 1600
 PASSES = 5
 
 
-class Field(NamedTuple):
-    """A signed distance on a grid, as core/mesh/distance_field.py has it."""
-
-    origin: Array
-    cell: float
-    dims: tuple[int, int, int]
-    values: NDArray[np.float32]
-
-
 def distance(points: Array, sphere: bool) -> Array:
     if not sphere:
         return points[..., 2]
-    return np.linalg.norm(points + [0.0, 0.0, BALL], axis=-1) - BALL
+    return np.linalg.norm(points - CENTRE, axis=-1) - BALL
 
 
 def normals(points: Array, sphere: bool) -> Array:
     if not sphere:
         return np.broadcast_to([0.0, 0.0, 1.0], points.shape).copy()
-    d = points + [0.0, 0.0, BALL]
+    d = points - CENTRE
     return d / np.linalg.norm(d, axis=-1, keepdims=True)
 
 
-def field_of(sphere: bool, cell: float = 0.08) -> Field:
+def field_of(sphere: bool, cell: float = 0.08) -> DistanceField:
+    """The exact distance, sampled on a grid."""
     low, high = np.array([-2.8, -2.8, -1.4]), np.array([3.8, 2.8, 1.6])
     dims = np.ceil((high - low) / cell).astype(int) + 1
     grid = np.stack(np.meshgrid(*[low[k] + cell * np.arange(dims[k]) for k in range(3)], indexing="ij"), axis=-1)
-    return Field(low, cell, tuple(int(d) for d in dims), freeze(distance(grid, sphere).astype(np.float32)))
+    return DistanceField(low, cell, 10.0, freeze(distance(grid, sphere).astype(np.float32)))
 
 
 def orthographic(side: bool) -> View:
@@ -68,7 +63,9 @@ def to_pixels(plane: Array) -> Array:
     return np.stack([0.5 * SIZE - 0.5 + PIXELS * plane[:, 0], 0.5 * SIZE - 0.5 - PIXELS * plane[:, 1]], axis=-1)
 
 
-def hair(seed: int, sphere: bool, half: tuple[float, float], upright: bool, count: int = 500, points: int = 16) -> Guides:
+def hair(
+    seed: int, sphere: bool, half: tuple[float, float], upright: bool, count: int = 500, points: int = 16
+) -> Guides:
     """Strands standing up (tilt 8 degrees, bend 0 .. 25) or lying flat along +x (elevation 20, bend 15)."""
     rng = np.random.default_rng(seed)
     roots = np.stack([rng.uniform(-half[0], half[0], count), rng.uniform(-half[1], half[1], count), np.zeros(count)], 1)
@@ -84,12 +81,14 @@ def hair(seed: int, sphere: bool, half: tuple[float, float], upright: bool, coun
         tilt, way = np.abs(rng.normal(0, np.radians(8), count)), rng.uniform(0, 2 * np.pi, count)
         bend, bend_way = rng.uniform(0, np.radians(25), count), rng.uniform(0, 2 * np.pi, count)
         angle = tilt[:, None] * np.stack([np.cos(way), np.sin(way)], 1)
-        angle = angle[:, None] + (bend[:, None] * s)[..., None] * np.stack([np.cos(bend_way), np.sin(bend_way)], 1)[:, None]
+        bent = np.stack([np.cos(bend_way), np.sin(bend_way)], 1)
+        angle = angle[:, None] + (bend[:, None] * s)[..., None] * bent[:, None]
         size = np.linalg.norm(angle, axis=-1, keepdims=True)
         local = np.concatenate([np.sin(size) * angle / np.maximum(size, 1e-12), np.cos(size)], axis=-1)
     else:
         up = np.radians(20) + np.radians(4) * rng.normal(size=count)
-        azimuth = np.radians(8) * rng.normal(size=count)[:, None] + rng.uniform(-1, 1, count)[:, None] * np.radians(15) * s
+        bend = np.radians(15) * rng.uniform(-1, 1, count)
+        azimuth = np.radians(8) * rng.normal(size=count)[:, None] + bend[:, None] * s
         e = np.broadcast_to(up[:, None], azimuth.shape)
         local = np.stack([np.cos(e) * np.cos(azimuth), np.cos(e) * np.sin(azimuth), np.sin(e)], axis=-1)
     q = np.einsum("gsk,gkc->gsc", local, frames)
@@ -208,7 +207,8 @@ def passes_needed(target: Target, sphere: bool, comb: Comb, seed: int) -> tuple[
     error = np.inf
     for count in range(1, PASSES + 1):
         for lane in target.lanes(sphere):
-            guides = comb(guides, view, resampled(to_pixels(lane), 0.1 * target.radius * PIXELS), target.radius * PIXELS, sphere)
+            radius = target.radius * PIXELS
+            guides = comb(guides, view, resampled(to_pixels(lane), 0.1 * radius), radius, sphere)
         error = float(target.error(guides.points.astype(np.float64), start, sphere).mean())
         if error <= target.threshold:
             return count, error, guides
@@ -231,7 +231,7 @@ def plain_brush(guides: Guides, view: View, path: Array, radius: float, sphere: 
     lengths = np.linalg.norm(np.diff(x, axis=1), axis=-1)
     basis = view.motion_basis()
     gap = 0.005 * lengths.sum(axis=1)
-    for a, b in zip(path[:-1], path[1:]):
+    for a, b in pairwise(path):
         pixels, _ = view.pixels(x)
         ab = b - a
         t = np.clip((pixels - a) @ ab / (ab @ ab), 0, 1)
