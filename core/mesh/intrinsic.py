@@ -1,0 +1,283 @@
+"""Binding points of a skin to sites on it: barycentric weights in the intrinsic Delaunay triangulation of the sites.
+
+The sites (roots of guides) are inserted into the intrinsic triangulation of the skin, then every vertex of the mesh is
+taken out while the bound points (roots of children) are carried along. What is left is a triangulation whose corners
+are sites only; a point's triangle and weights there are its binding. It is continuous over the skin, exact at sites,
+and cannot leak between parts that are near but not connected, because nothing but the surface is ever looked at.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from core.mesh.halfedge import Manifold, manifold
+from core.mesh.intrinsic_flips import (
+    FREE,
+    I1,
+    NET,
+    TOUCHED,
+    Net,
+    insert_vertex,
+    legalise_all,
+    unhang,
+)
+from core.mesh.intrinsic_points import (
+    HELPER,
+    PHANTOM,
+    SITE,
+    find_place,
+    hang_points,
+    label_helpers,
+    read_all,
+    read_changed,
+)
+from core.mesh.intrinsic_removal import make_ring, remove_vertex, remove_vertices
+from core.random import rand
+
+FEWEST = 4  # a piece of skin needs this many vertices that stay
+HELPERS = 6  # or else keeps this many of the mesh's own
+SPARE = 256  # sites that can be added before arrays grow
+
+
+class Binding(NamedTuple):
+    """Three sites and weights for every bound point, in the order the points were given.
+
+    sites : (N, 3) int32, rows of sites; one that stands twice has all its weight in its first place.
+    weights : (N, 3) float32, >= 0, summing to 1.
+    order : (N,) int32, points sorted by triangle of sites: rows stored so are quick to evaluate.
+    helped : points bound through a mesh vertex that could not be taken out (continuous, but coarser).
+    nearest : points on pieces of the skin without any site: bound to the nearest site in space.
+    """
+
+    sites: NDArray[np.int32]
+    weights: NDArray[np.float32]
+    order: NDArray[np.int32]
+    helped: int
+    nearest: int
+
+
+class Rebound(NamedTuple):
+    """Points whose binding changed: rows (n,) int32, sites (n, 3) int32, weights (n, 3) float32."""
+
+    rows: NDArray[np.int32]
+    sites: NDArray[np.int32]
+    weights: NDArray[np.float32]
+
+
+@njit(types.int64(NET, I1, types.int64), cache=True, nogil=True)
+def _insert_sites(net, vertices, base):  # type: ignore[no-untyped-def]
+    """Make vertices of the tracked points ``base + v``; returns how many found a place."""
+    done = 0
+    for i in range(len(vertices)):
+        v = vertices[i]
+        f = net.home[base + v]
+        if f < 0:
+            continue
+        unhang(net, base + v)
+        b = net.bary[base + v]
+        if insert_vertex(net, v, f, b[0], b[1], b[2]):
+            done += 1
+    return done
+
+
+def bind(
+    points: ArrayLike, triangles: ArrayLike, site_triangle: ArrayLike, site_barycentric: ArrayLike,
+    tracked_triangle: ArrayLike, tracked_barycentric: ArrayLike, seed: int = 0,
+) -> Binding:
+    """Bind tracked points of a skin to sites on it; see :class:`SurfaceSites` for the parameters."""
+    return SurfaceSites(
+        points, triangles, site_triangle, site_barycentric, tracked_triangle, tracked_barycentric, seed
+    ).binding()
+
+
+class SurfaceSites:
+    """The triangulation of the sites, kept so that one site can be added or taken away in well under a millisecond.
+
+    Mutable and owned by an evaluator. Costs about 32 bytes for every tracked point while it is kept.
+
+    Parameters
+    ----------
+    points : (V, 3) float, metres; any units serve.
+    triangles : (T, 3) int; cracks are welded, non-manifold edges cut, see :mod:`core.mesh.halfedge`.
+    site_triangle, site_barycentric : (G,) int and (G, 3) float, at least one site.
+    tracked_triangle, tracked_barycentric : (N,) int and (N, 3) float.
+    seed : order in which mesh vertices are taken out.
+    """
+
+    def __init__(
+        self, points: ArrayLike, triangles: ArrayLike, site_triangle: ArrayLike, site_barycentric: ArrayLike,
+        tracked_triangle: ArrayLike, tracked_barycentric: ArrayLike, seed: int = 0,
+    ) -> None:
+        self._points = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
+        self._triangles = np.ascontiguousarray(triangles, np.int32).reshape(-1, 3)
+        self._seed = seed
+        self._site_triangle = np.array(site_triangle, np.int32).reshape(-1)
+        self._site_bary = np.array(site_barycentric, np.float64).reshape(-1, 3)
+        self._tracked_triangle = np.asarray(tracked_triangle, np.int32).reshape(-1)
+        self._tracked_bary = np.asarray(tracked_barycentric, np.float64).reshape(-1, 3)
+        self._ring = make_ring()
+        self._build()
+
+    @property
+    def sites(self) -> int:
+        """How many sites there are."""
+        return len(self._site_triangle)
+
+    # -- building -----------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        if self.sites == 0 or len(self._triangles) == 0:
+            raise ValueError("binding needs at least one site and one triangle")
+        spacing = np.sqrt(_surface_area(self._points, self._triangles) / self.sites)
+        self._skin = skin = manifold(self._points, self._triangles, fill=2.0 * float(spacing))
+        self.edits = 0
+        given = np.argsort(self._tracked_triangle, kind="stable").astype(np.int32)
+        self._given = given  # inner point -> row as given; neighbours on the skin lie together
+        self._count = len(given)
+        face, bary = self._on_skin(self._tracked_triangle[given], self._tracked_bary[given])
+        self._allocate(skin, self._count)
+        hang_points(self._net, face, bary, 0)
+        home, bary = self._on_skin(self._site_triangle, self._site_bary)
+        vertex = np.arange(skin.vertices, skin.vertices + self.sites, dtype=np.int32)
+        hang_points(self._net, home, bary, self._count + skin.vertices)
+        self._vertex = vertex  # of each site
+        self._used_vertices = skin.vertices + self.sites
+        self._kind[vertex] = SITE
+        self._label[vertex] = np.arange(self.sites, dtype=np.int32)
+
+        legalise_all(self._net)
+        _insert_sites(self._net, vertex, self._count)
+        self._remove_mesh(skin, home)
+        self._net.changed[:] = 0
+        self._net.tally[TOUCHED] = 0
+        self._nearest_site = None
+        self._relabel()
+
+    def _allocate(self, skin: Manifold, count: int) -> None:
+        used = len(skin.origin) // 3
+        room = self.sites + SPARE
+        faces, vertices = used + 2 * room, skin.vertices + room
+        origin = np.full(3 * faces, -1, np.int32)
+        twin = np.full(3 * faces, -1, np.int32)
+        length = np.zeros(3 * faces)
+        origin[: 3 * used], twin[: 3 * used], length[: 3 * used] = skin.origin, skin.twin, skin.length
+        first = np.full(vertices, -1, np.int32)
+        first[skin.origin] = np.arange(3 * used, dtype=np.int32)
+        free = np.zeros(faces, np.int32)
+        free[: 2 * room] = np.arange(faces - 1, used - 1, -1)
+        tally = np.zeros(4, np.int64)
+        tally[FREE] = 2 * room
+        tracked = count + vertices
+        self._net = Net(
+            origin, twin, length, first, np.full(faces, -1, np.int32), np.full(tracked, -1, np.int32),
+            np.full(tracked, -1, np.int32), np.zeros((tracked, 3)), np.zeros(3 * faces, np.uint8),
+            np.empty(3 * faces, np.int32), np.ones(faces, np.uint8), np.empty(faces, np.int32), free, tally,
+        )
+        self._kind = np.zeros(vertices, np.uint8)
+        self._label = np.full(vertices, -1, np.int32)
+
+    def _on_skin(
+        self, triangle: NDArray[np.int32], bary: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Face and weights on the manifold; a place on a triangle that was left out goes to the nearest corner."""
+        skin = self._skin
+        face = skin.face[triangle]
+        bary = np.clip(np.nan_to_num(bary), 0.0, None)
+        total = bary.sum(axis=1, keepdims=True)
+        bary = np.where(total > 0.0, bary / np.where(total > 0.0, total, 1.0), 1.0 / 3.0)
+        lost = np.flatnonzero(face < 0)
+        live = np.flatnonzero(skin.face >= 0)
+        if len(lost) and len(live):
+            corners = np.nan_to_num(self._points[self._triangles[live]]).reshape(-1, 3)
+            place = np.einsum("nk,nkc->nc", bary[lost], np.nan_to_num(self._points[self._triangles[triangle[lost]]]))
+            near = cKDTree(corners).query(place)[1]
+            triangle = triangle.copy()
+            triangle[lost] = live[near // 3]
+            face[lost] = skin.face[triangle[lost]]
+            bary[lost] = np.eye(3)[near % 3]
+        turned = skin.flipped[triangle] == 1
+        bary[turned] = bary[turned][:, [0, 2, 1]]
+        return face.astype(np.int32), np.ascontiguousarray(bary)
+
+    def _remove_mesh(self, skin: Manifold, site_face: NDArray[np.int32]) -> None:
+        """Take out every vertex of the mesh, in seeded order, except those a piece needs to stay a surface."""
+        mesh = np.arange(skin.vertices)
+        loop = skin.vertices - len(skin.loops)
+        phantom = (mesh >= loop) & ~np.concatenate([np.zeros(loop, bool), skin.filled])
+        self._kind[: skin.vertices][phantom] = PHANTOM
+        site_piece = skin.component[self._net_vertex(site_face)]
+        sites = np.bincount(site_piece, minlength=skin.components)
+        stay = sites + np.bincount(skin.component[phantom], minlength=skin.components)
+        self._sites_on = sites
+        order = mesh[np.argsort(rand(mesh, self._seed), kind="stable")]
+        order = order[~phantom[order]]
+        piece = skin.component[order]
+        few = np.flatnonzero((stay < FEWEST) | (sites == 0))
+        keep = np.zeros(len(order), bool)
+        for c in few:
+            mine = np.flatnonzero(piece == c)
+            keep[mine if sites[c] == 0 else mine[-HELPERS:]] = True
+        self._kind[order[keep]] = HELPER
+        going = np.ascontiguousarray(order[~keep], np.int32)
+        stuck = remove_vertices(self._net, self._ring, going, self._count)
+        self._kind[going[:stuck]] = HELPER
+        self._stay = stay
+        self._stay += np.bincount(skin.component[order[keep]], minlength=skin.components)
+
+    def _net_vertex(self, face: NDArray[np.int32]) -> NDArray[np.int32]:
+        """A mesh vertex of each face of the manifold as it was."""
+        return self._skin.origin[3 * face]
+
+    # -- reading ------------------------------------------------------------------------------------------
+
+    def _relabel(self) -> None:
+        label_helpers(self._net, self._kind, self._label, np.empty(len(self._kind)))
+
+    def binding(self) -> Binding:
+        """The binding of every tracked point as it stands."""
+        n = self._count
+        sites = np.empty((n, 3), np.int32)
+        weights = np.empty((n, 3), np.float32)
+        order = np.empty(n, np.int32)
+        trouble = np.zeros(n, np.uint8)
+        read_all(self._net, self._kind, self._label, self._given, n, sites, weights, order, trouble)
+        lost = np.flatnonzero(trouble == 2)
+        if len(lost):
+            sites[lost] = self._nearest(lost)[:, None]
+        return Binding(sites, weights, order, int((trouble == 1).sum()), len(lost))
+
+    def _nearest(self, rows: NDArray[np.intp]) -> NDArray[np.int32]:
+        """The site nearest in space to each of the given tracked points."""
+
+        def place(triangle: NDArray[np.int32], bary: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.einsum("nk,nkc->nc", bary, np.nan_to_num(self._points[self._triangles[triangle]]))
+
+        if self._nearest_site is None:
+            self._nearest_site = cKDTree(place(self._site_triangle, self._site_bary))
+        found = self._nearest_site.query(place(self._tracked_triangle[rows], self._tracked_bary[rows]))[1]
+        return np.asarray(found, np.int32)
+
+    def _changes(self) -> Rebound:
+        n = self._count
+        rows = np.empty(n, np.int32)
+        sites = np.empty((n, 3), np.int32)
+        weights = np.empty((n, 3), np.float32)
+        trouble = np.empty(n, np.uint8)
+        found = read_changed(
+            self._net, self._kind, self._label, self._given, n, rows, sites, weights, trouble
+        )
+        lost = np.flatnonzero(trouble[:found] == 2)
+        if len(lost):
+            sites[lost] = self._nearest(rows[lost])[:, None]
+        return Rebound(rows[:found].copy(), sites[:found].copy(), weights[:found].copy())
+
+
+def _surface_area(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> float:
+    corners = points[triangles]
+    double = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return 0.5 * float(np.nansum(double))

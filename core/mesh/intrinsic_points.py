@@ -1,0 +1,241 @@
+"""Tracked points of an intrinsic triangulation: hanging them up, reading their binding, finding a new place."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from core.mesh.intrinsic_flips import B1, F1, F2, I1, NET, TOUCHED, area, touch
+
+_RI1 = types.Array(types.int32, 1, "C", readonly=True)
+_I2 = types.Array(types.int32, 2, "C")
+_S2 = types.Array(types.float32, 2, "C")
+
+SITE, PHANTOM, HELPER = 1, 2, 3  # what a vertex that stays is
+FEW = 1e-9
+
+
+@njit(types.void(NET, I1, F2, types.int64), cache=True, nogil=True)
+def hang_points(net, face, bary, start):  # type: ignore[no-untyped-def]
+    """Hang points ``start ..`` into their faces (-1: none)."""
+    for i in range(len(face) - 1, -1, -1):  # backwards, so that lists run forwards
+        p, f = start + i, face[i]
+        net.home[p] = f
+        net.bary[p, 0], net.bary[p, 1], net.bary[p, 2] = bary[i, 0], bary[i, 1], bary[i, 2]
+        if f >= 0:
+            net.follow[p] = net.head[f]
+            net.head[f] = p
+
+
+@njit(types.boolean(NET, B1, I1, F1), cache=True, nogil=True)
+def label_helpers(net, kind, label, distance):  # type: ignore[no-untyped-def]
+    """Give vertices that are no sites the site nearest along edges; True when a helper's changed.
+
+    Points of the faces around such a helper are noted as moved.
+    """
+    vertices = len(kind)
+    before = label.copy()
+    for v in range(vertices):
+        distance[v] = 0.0 if kind[v] == SITE else np.inf
+        if kind[v] != SITE:
+            label[v] = -1
+    for _ in range(64):
+        better = False
+        for h in range(len(net.origin)):
+            v = net.origin[h]
+            if v < 0:
+                continue
+            w = net.origin[net.twin[h]]
+            if distance[v] + net.length[h] < distance[w]:
+                distance[w] = distance[v] + net.length[h]
+                label[w] = label[v]
+                better = True
+        if not better:
+            break
+    other = False
+    for h in range(len(net.origin)):
+        v = net.origin[h]
+        if v >= 0 and kind[v] == HELPER and label[v] != before[v]:
+            touch(net, h // 3)
+            other = True
+    return other
+
+
+@njit(types.int64(NET, B1, I1, types.int64, _I2, _S2, types.int64), cache=True, nogil=True)
+def read_point(net, kind, label, p, sites, weights, row):  # type: ignore[no-untyped-def]
+    """Write the binding of point `p` to a row: 0 bound to sites, 1 through a helper, 2 to no site at all.
+
+    Phantoms are dropped and the rest renormalised; corners that are one site are added up.
+    """
+    f = net.home[p]
+    a, b, c = -1, -1, -1
+    wa, wb, wc = 0.0, 0.0, 0.0
+    through = 0
+    if f >= 0:
+        for phantoms in range(2):  # phantoms count only where there is nothing else
+            for k in range(3):
+                v = net.origin[3 * f + k]
+                w = net.bary[p, k]
+                s = label[v]
+                if s < 0 or (kind[v] == PHANTOM) != (phantoms == 1):
+                    continue
+                if kind[v] == HELPER and w > 0.0:
+                    through = 1
+                if a == s or a < 0:
+                    a = s
+                    wa += w
+                elif b == s or b < 0:
+                    b = s
+                    wb += w
+                else:
+                    c = s
+                    wc += w
+            if wa + wb + wc > FEW:
+                break
+    if a < 0:
+        for k in range(3):
+            sites[row, k] = 0
+            weights[row, k] = 1.0 if k == 0 else 0.0
+        return 2
+    total = wa + wb + wc
+    scale = 1.0 / total if total > 0.0 else 0.0
+    if total <= 0.0:
+        wa, scale = 1.0, 1.0
+    sites[row, 0] = a
+    sites[row, 1] = b if b >= 0 else a
+    sites[row, 2] = c if c >= 0 else a
+    weights[row, 0], weights[row, 1], weights[row, 2] = wa * scale, wb * scale, wc * scale
+    return through
+
+
+@njit(types.int64(NET, B1, I1, _RI1, types.int64, _I2, _S2, I1, B1), cache=True, nogil=True)
+def read_all(net, kind, label, given, count, sites, weights, order, trouble):  # type: ignore[no-untyped-def]
+    """Write the binding of points 0 .. count, in given order, and the order sorted by face; how many have a face."""
+    at = 0
+    for f in range(len(net.head)):
+        p = net.head[f]
+        while p >= 0:
+            if p < count:
+                row = given[p]
+                trouble[row] = read_point(net, kind, label, p, sites, weights, row)
+                order[at] = row
+                at += 1
+            p = net.follow[p]
+    for p in range(count):
+        if net.home[p] < 0:
+            row = given[p]
+            trouble[row] = read_point(net, kind, label, p, sites, weights, row)
+            order[at] = row
+            at += 1
+    return at
+
+
+@njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
+def read_changed(net, kind, label, given, count, rows, sites, weights, trouble):  # type: ignore[no-untyped-def]
+    """The same for the points of touched faces only, which are then forgotten; returns how many."""
+    at = 0
+    for i in range(net.tally[TOUCHED]):
+        f = net.touched[i]
+        net.changed[f] = 0
+        p = net.head[f]
+        while p >= 0:
+            if p < count:
+                rows[at] = given[p]
+                trouble[at] = read_point(net, kind, label, p, sites, weights, at)
+                at += 1
+            p = net.follow[p]
+    net.tally[TOUCHED] = 0
+    return at
+
+
+@njit(types.int64(NET, types.int64, I1, F1, F1), cache=True, nogil=True)
+def find_place(net, base, corners, weights, out):  # type: ignore[no-untyped-def]
+    """Where a place on a mesh triangle lies now: unfold faces until its corners' places are found, then blend.
+
+    Parameters
+    ----------
+    base : the tracked point of vertex v is ``base + v``.
+    corners, weights : (3,) the vertices of the mesh triangle and their weights.
+    out : (3,) written with the weights in the face.
+
+    Returns the face, -1 where there is none.
+    """
+    reach = 96
+    face = np.empty(reach, np.int32)
+    flat = np.empty((reach, 6))
+    at_face = np.empty(3, np.int32)
+    at = np.zeros((3, 3))
+    pos = np.zeros((3, 2))
+    known = np.zeros(3, np.uint8)
+    lead = 0
+    for k in range(3):
+        v = corners[k]
+        if net.first[v] >= 0:
+            at_face[k] = net.first[v] // 3
+            at[k, net.first[v] % 3] = 1.0
+        else:
+            at_face[k] = net.home[base + v]
+            at[k] = net.bary[base + v]
+        if weights[k] > weights[lead]:
+            lead = k
+    if at_face[lead] < 0:
+        return -1
+    e = 3 * at_face[lead]
+    face[0] = at_face[lead]
+    l01, l12, l20 = net.length[e], net.length[e + 1], net.length[e + 2]
+    flat[0] = 0.0
+    flat[0, 2] = l01
+    flat[0, 4] = (l01 * l01 + l20 * l20 - l12 * l12) / (2.0 * l01)
+    flat[0, 5] = 2.0 * area(l01, l12, l20) / l01
+    used, i, missing = 1, 0, 3
+    while i < used and missing > 0:
+        f = face[i]
+        for k in range(3):
+            if not known[k] and at_face[k] == f:
+                known[k] = 1
+                missing -= 1
+                for m in range(3):
+                    pos[k, 0] += at[k, m] * flat[i, 2 * m]
+                    pos[k, 1] += at[k, m] * flat[i, 2 * m + 1]
+        for k in range(3):
+            t = net.twin[3 * f + k]
+            g, tk = t // 3, t % 3
+            seen = used >= reach
+            for j in range(used):
+                seen = seen or face[j] == g
+            if seen:
+                continue
+            # g's edge t runs from b to a; its third corner lies on the far side
+            k1 = (k + 1) % 3
+            ax, ay, bx, by = flat[i, 2 * k], flat[i, 2 * k + 1], flat[i, 2 * k1], flat[i, 2 * k1 + 1]
+            n, q = (tk + 1) % 3, (tk + 2) % 3
+            l, ad, db = net.length[t], net.length[3 * g + n], net.length[3 * g + q]
+            along = (l * l + ad * ad - db * db) / (2.0 * l * l)
+            off = -2.0 * area(l, ad, db) / (l * l)
+            dx, dy = bx - ax, by - ay
+            face[used] = g
+            flat[used, 2 * tk], flat[used, 2 * tk + 1] = bx, by
+            flat[used, 2 * n], flat[used, 2 * n + 1] = ax, ay
+            flat[used, 2 * q], flat[used, 2 * q + 1] = ax + along * dx - off * dy, ay + along * dy + off * dx
+            used += 1
+        i += 1
+    x, y, total = 0.0, 0.0, 0.0
+    for k in range(3):
+        if known[k]:
+            x += weights[k] * pos[k, 0]
+            y += weights[k] * pos[k, 1]
+            total += weights[k]
+    x /= total
+    y /= total
+    best, least = 0, -np.inf
+    for j in range(used):
+        ax, ay = flat[j, 0], flat[j, 1]
+        ux, uy, vx, vy = flat[j, 2] - ax, flat[j, 3] - ay, flat[j, 4] - ax, flat[j, 5] - ay
+        double = max(ux * vy - uy * vx, 1e-300)
+        b = ((x - ax) * vy - (y - ay) * vx) / double
+        c = (ux * (y - ay) - uy * (x - ax)) / double
+        low = min(min(b, c), 1.0 - b - c)
+        if low > least:
+            best, least = j, low
+            out[0], out[1], out[2] = 1.0 - b - c, b, c
+    return face[best]
