@@ -10,6 +10,7 @@ from core.camera import Camera
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
+from core.pose.skeleton import Rig
 from core.record import Record, number, text
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -19,18 +20,22 @@ class MeshObject(Record):
     """A mesh in the document.
 
     id : stable, unique in the document.
+    rig : what moves it, or None for a mesh at rest.
     hidden, locked : as the artist set them; a locked mesh is not edited.
     """
 
     id: int
     name: str
     mesh: Mesh
+    rig: Rig | None = None
     hidden: bool = False
     locked: bool = False
 
     def __post_init__(self) -> None:
         text(self, "name")
         number(self, "id", least=0, most=2**31 - 1)
+        if self.rig is not None and len(self.rig.skin.joints) != len(self.mesh.points):
+            raise ValueError(f"MeshObject.rig moves {len(self.rig.skin.joints)} vertices of {len(self.mesh.points)}")
 
 
 class Document(Record):

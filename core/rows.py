@@ -28,7 +28,7 @@ def bytes_of_rows(array: NDArray[Any]) -> NDArray[np.uint8]:
     """A C-contiguous (N, ...) array seen as (N, bytes of a row) uint8, sharing memory."""
     n = array.shape[0]
     width = array.nbytes // n if n else 0
-    return array.reshape(n, -1).view(np.uint8).reshape(n, width)
+    return array.reshape(-1).view(np.uint8).reshape(n, width)
 
 
 def changed_rows(old: NDArray[Any], new: NDArray[Any]) -> NDArray[np.int32]:

@@ -152,7 +152,7 @@ class Journal:
             self._abandon_file()
             why = error.strerror if isinstance(error, OSError) else str(error)
             self.error = UserError(
-                f"The autosave in {self.folder} failed ({why}): save your work now, on another disk if this one is full."
+                f"The autosave in {self.folder} failed ({why}): save your work now, elsewhere if this disk is full."
             )
         else:
             self._durable, self.error = wanted.sequence, None

@@ -1,0 +1,77 @@
+"""Small documents for tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from core.camera import Camera
+from core.document import Document, MeshObject, Workspace
+from core.groom.groom import Coat, Groom, Map
+from core.groom.guides import Guides
+from core.mesh.mesh import Mesh
+from core.mesh.roots import Roots
+from core.record import freeze
+
+
+def grid_mesh(side: int) -> Mesh:
+    """A square of side x side quads in the plane y = 0, with UVs."""
+    n = side + 1
+    x, z = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
+    first = (np.arange(side)[:, None] * n + np.arange(side)).ravel()
+    corners = np.stack([first, first + n, first + n + 1, first + 1], axis=1).ravel().astype(np.int32)
+    points = np.stack([x.ravel(), np.zeros(n * n), z.ravel()], axis=1).astype(np.float32)
+    return Mesh(
+        points=points, counts=np.full(side * side, 4, np.int32), corners=corners,
+        uvs=points[corners][:, [0, 2]].copy(), parts=np.zeros(side * side, np.int32), part_names=("sheet",),
+    )
+
+
+def guides_on(mesh: Mesh, count: int, points: int = 4, seed: int = 0) -> Guides:
+    """Straight guides at random places of the faces of a grid mesh."""
+    rng = np.random.default_rng(seed)
+    faces = rng.integers(0, len(mesh.counts), count).astype(np.int32)
+    weights = rng.dirichlet([1.0, 1.0, 1.0], count).astype(np.float32)
+    corners = np.tile(np.array([0, 1, 2], np.int32), (count, 1))
+    vertices = mesh.corners[mesh.starts[faces][:, None] + corners]
+    root = np.einsum("nk,nkc->nc", weights, mesh.points[vertices])
+    along = np.linspace(0.0, 0.1, points, dtype=np.float32)
+    curves = root[:, None, :] + along[None, :, None] * np.array([0.0, 1.0, 0.0], np.float32)
+    roots = Roots(
+        faces=faces, corners=corners, weights=weights, uvs=root[:, [0, 2]].astype(np.float32),
+        frames=np.tile(np.eye(3, dtype=np.float32)[[0, 2, 1]], (count, 1, 1)),
+    )
+    return Guides(
+        ids=np.arange(count, dtype=np.int32), roots=roots, points=curves.astype(np.float32),
+        hold=np.zeros((count, points), np.float32), selected=np.zeros(count, np.bool_),
+        frozen=np.zeros(count, np.bool_), next_id=count,
+    )
+
+
+def small_document(guides: int = 12, side: int = 3, points: int = 4, seed: int = 0) -> Document:
+    """One mesh and one groom with a map."""
+    mesh = grid_mesh(side)
+    density = np.linspace(0.0, 1.0, len(mesh.points), dtype=np.float32)
+    groom = Groom(
+        id=1, name="coat", mesh_id=7, guides=guides_on(mesh, guides, points, seed),
+        coat=Coat(count=1000, density_map="density"), maps=(Map(name="density", values=density),),
+    )
+    return Document(meshes=(MeshObject(id=7, name="sheet", mesh=mesh),), grooms=(groom,))
+
+
+def small_workspace() -> Workspace:
+    """A workspace with one of everything."""
+    camera = Camera(world_from_camera=np.eye(4))
+    return Workspace(frame=1012.5, cameras=(camera,), panels=("history",), tool="comb", params={"radius": 0.25})
+
+
+def stroked(document: Document, seed: int, share: float = 0.3) -> Document:
+    """The document after a made-up stroke: a share of the guides of its first groom moved."""
+    rng = np.random.default_rng(seed)
+    groom = document.grooms[0]
+    points = groom.guides.points.copy()
+    rows = rng.permutation(len(points))[: max(1, int(share * len(points)))]
+    points[rows, 1:] += rng.normal(0.0, 0.01, points[rows, 1:].shape).astype(np.float32)
+    moved: Any = groom.replace(guides=groom.guides.replace(points=freeze(points)))
+    return document.replace(grooms=(moved, *document.grooms[1:]))  # type: ignore[no-any-return]
