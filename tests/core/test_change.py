@@ -1,5 +1,7 @@
 """Differences of trees, there and back."""
 
+import itertools
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -48,7 +50,7 @@ EDITS = _edits()
 @given(st.lists(st.sampled_from(range(len(EDITS))), min_size=2, max_size=6))
 def test_a_chain_of_changes_leads_both_ways_to_the_bit(path):
     states = [EDITS[i] for i in path]
-    changes = [difference(a, b) for a, b in zip(states, states[1:])]
+    changes = [difference(a, b) for a, b in itertools.pairwise(states)]
     forward, backward = Walk(states[0]), Walk(states[-1])
     for change in changes:
         forward.step(change, True)
