@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import moderngl
 
@@ -20,8 +21,9 @@ def standalone_context() -> moderngl.Context:
     UserError
         When no EGL library or no driver with OpenGL 3.3 is found.
     """
+    settings: dict[str, Any] = {"require": 330, "standalone": True, "backend": "egl"}
     try:
-        context = moderngl.create_standalone_context(require=330, backend="egl")
+        context = moderngl.create_context(**settings)
     except Exception as error:  # glcontext raises bare Exceptions
         raise UserError(
             "Pictures need OpenGL 3.3 through EGL, and none was found; install the packages libegl1 and "

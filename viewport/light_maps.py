@@ -80,11 +80,13 @@ class LightMaps:
         ends = tuple(float(v) for v in LAYERS * length)
         ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
         ctx.enable(moderngl.DEPTH_TEST)
-        for target, drawn in ((self.skin_target, meshes), (self.first_target, [*meshes, *coats])):
+        for target in (self.skin_target, self.first_target):
             target.use()
             target.clear(depth=1.0)
-            for thing in drawn:
-                thing.draw_depth(matrix)
+            for mesh in meshes:
+                mesh.draw_depth(matrix)
+        for coat in coats:
+            coat.draw_depth(matrix)
         self.sums_target.use()
         self.sums_target.clear()
         ctx.disable(moderngl.DEPTH_TEST)

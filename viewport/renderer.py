@@ -45,7 +45,7 @@ class Renderer:
         self.tile: tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer] | None = None
 
     def rows_changed(self, points: np.ndarray, start: int, stop: int) -> None:
-        """Upload hairs or guides `start` to before `stop` of an array that is already on the card and was written to."""
+        """Upload hairs or guides `start` to before `stop` of an array on the card that was written to in place."""
         for coat in self.coats:
             if coat.coat.points is points:
                 coat.upload_rows(coat.coat, start, stop)
@@ -70,7 +70,8 @@ class Renderer:
         lighting |= _light_uniforms(scene, camera, toward)
         told(0.2)
         view_row = -view_from_world(camera)[2]
-        orders = [far_to_near(strands, view_row) for strands in (s.points for s in (*scene.coats, *scene.guides))]
+        strands = [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]
+        orders = [far_to_near(points, view_row) for points in strands]
         tiles = _tiles(size, samples)
         for number, tile in enumerate(tiles):
             def tile_told(part: float, number: int = number) -> None:
@@ -95,7 +96,7 @@ class Renderer:
         self, scene: Scene, camera: Camera, size: tuple[int, int], samples: int, tile: tuple[int, int, int, int],
         lighting: dict[str, Any], orders: list[NDArray[np.uint32]], told: Progress,
     ) -> None:
-        x, y, width, height = tile
+        _, _, width, height = tile
         wide, high = width * samples, height * samples
         matrix = _tile_from_picture(size, tile) @ clip_from_world(camera, *size)
         uniforms = {
@@ -120,7 +121,7 @@ class Renderer:
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         target.depth_mask = False
-        drawn = [d.textures for d in (*self.coats, *self.guides)]
+        drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
         total, before = sum(len(order) for order in orders), 0
         try:
             for textures, order in zip(drawn, orders, strict=True):
@@ -167,10 +168,9 @@ class Renderer:
     def release(self) -> None:
         """Give back everything; the context must be current."""
         self._release_tile()
-        for thing in (
-            *self.meshes, *self.coats, *self.guides, self.resolve_triangle, self.resolve, self.light_maps,
-            self.ribbons, self.mesh_programs, self.strand_programs, self.guide_programs,
-        ):
+        things: list[Any] = [*self.meshes, *self.coats, *self.guides, self.resolve_triangle, self.resolve]
+        things += [self.light_maps, self.ribbons, self.mesh_programs, self.strand_programs, self.guide_programs]
+        for thing in things:
             thing.release()
         self.meshes, self.coats, self.guides = [], [], []
 
@@ -180,7 +180,7 @@ def _nobody(_: float) -> None:
 
 
 def _matched(kept: list[Any], wanted: tuple[Any, ...], make: Callable[[Any], Any]) -> list[Any]:
-    """Drawables for the wanted things: one that holds just these arrays, else one that can take them, else a new one."""
+    """Drawables for the wanted things: one with just these arrays, else one that can take them, else a new one."""
     spare = list(kept)
     found: list[Any] = [None] * len(wanted)
     for turn in ("holds", "update"):
@@ -208,7 +208,7 @@ def _light_uniforms(scene: Scene, camera: Camera, toward: dict[str, NDArray[np.f
 
 
 def _tiles(size: tuple[int, int], samples: int) -> list[tuple[int, int, int, int]]:
-    """Rectangles x, y, width, height in pixels that cover the picture, none with more than LARGEST_TILE samples a side."""
+    """Rectangles x, y, width, height in pixels that cover the picture, at most LARGEST_TILE samples a side."""
     side = max(1, LARGEST_TILE // samples)
     width, height = size
     return [

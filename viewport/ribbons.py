@@ -63,7 +63,7 @@ class Ribbons:
             strand, piece = np.divmod(segments, pieces)
             first = (strand * np.uint32(strands.per_strand) + piece) * np.uint32(2)
             self.indices.orphan()
-            self.indices.write(memoryview(first[:, None] + CORNERS))
+            self.indices.write((first[:, None] + CORNERS).data)
             self.vertices.render(moderngl.TRIANGLES, vertices=6 * len(segments))
             slice_done((start + len(segments)) / len(order))
 

@@ -39,8 +39,8 @@ class Look(NamedTuple):
     depth : how quickly light is swallowed inside the coat, 1 usual; 0 gives no shadow of hair upon hair.
     """
 
-    root: Color = (0.045, 0.024, 0.012)
-    tip: Color = (0.46, 0.25, 0.115)
+    root: Color = (0.055, 0.030, 0.016)
+    tip: Color = (0.43, 0.225, 0.105)
     blend: float = 0.42
     value_variation: float = 0.35
     hue_variation: float = 0.25
@@ -136,8 +136,7 @@ def scene_extent(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]
 def all_points(scene: Scene) -> list[np.ndarray]:
     """Arrays (n, 3) that bound the scene: vertices of the surfaces; roots, middles and tips of hairs and guides."""
     found = [surface.points for surface in scene.surfaces]
-    for strands in (*scene.coats, *scene.guides):
-        points = strands.points
+    for points in [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]:
         axis = 2 if points.shape[1] == 3 else 1
         for at in (0, points.shape[axis] // 2, points.shape[axis] - 1):
             found.append(points.take(at, axis=axis))

@@ -36,7 +36,7 @@ class StrandTextures:
         self.sides = self._texture(self.per_row * self.per_strand, 4, "f2")
         self.colors = self._texture(self.per_row * self.per_strand, 4, "f2")
         self.target = ctx.framebuffer([self.sides, self.colors])
-        self.write(self.points, points.reshape(self.count, -1))
+        self.write(self.points, points.reshape(self.count, 3 * self.per_strand))
 
     def _texture(self, width: int, components: int, dtype: str) -> moderngl.Texture:
         texture = self.ctx.texture((width, self.rows), components, dtype=dtype, alignment=4)
@@ -59,11 +59,11 @@ class StrandTextures:
         first, full = start // self.per_row, stop // self.per_row
         if full > first:
             block = values[first * self.per_row : full * self.per_row]
-            texture.write(memoryview(block), viewport=(0, first, self.per_row * wide, full - first))
+            texture.write(block.data, viewport=(0, first, self.per_row * wide, full - first))
         rest = stop - full * self.per_row
         if rest > 0:
             block = values[full * self.per_row : stop]
-            texture.write(memoryview(block), viewport=(0, full, rest * wide, 1))
+            texture.write(block.data, viewport=(0, full, rest * wide, 1))
 
     def bind(self, prog: moderngl.Program) -> None:
         """Make the points readable by a program with strand_points.glsl (texture unit 0)."""

@@ -1,11 +1,13 @@
-// Camera-facing ribbons. The vertex number says strand, point and side; half a pixel is added on both sides for the filter.
+// Camera-facing ribbons. The vertex number says strand, point and side; as much is added on both sides
+// as a pixel reaches over the edge.
 uniform sampler2D strand_sides;
 uniform sampler2D strand_colors;
 uniform mat4 clip_from_world;
 uniform vec2 picture_size;
-noperspective out float from_middle;
-noperspective out float half_width;
-noperspective out vec4 color;
+out float from_middle;
+out float half_width;
+out vec2 boxes;
+out vec4 color;
 
 void main()
 {
@@ -17,7 +19,9 @@ void main()
     vec4 side = texelFetch(strand_sides, at, 0);
     color = texelFetch(strand_colors, at, 0);
     half_width = side.z;
-    from_middle = (float(gl_VertexID & 1) * 2.0 - 1.0) * (half_width + 0.5);
+    vec2 extent = abs(side.xy);
+    boxes = vec2(max(extent.x, extent.y), max(min(extent.x, extent.y), 0.02));
+    from_middle = (float(gl_VertexID & 1) * 2.0 - 1.0) * (half_width + 0.5 * (boxes.x + boxes.y));
     gl_Position = clip_from_world * vec4(strand_point(strand, point), 1.0);
     gl_Position.xy += side.xy * from_middle * 2.0 / picture_size * gl_Position.w;
 }

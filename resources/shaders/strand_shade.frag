@@ -31,7 +31,8 @@ vec3 highlights(vec3 t, vec3 l, vec3 v, vec3 body, float backlit)
     float r = lobe(s, -0.14, roughness * 0.9) * 0.25 * cos_half;
     float trt = lobe(s, 0.16, roughness * 1.9) * (0.15 + 0.85 * cos_half * cos_half * cos_half);
     float tt = lobe(s, 0.05, roughness * 1.2) * exp(-3.65 * cos_phi - 3.98);
-    return vec3(0.085 * r) + body * (0.16 * trt) + pow(body, vec3(0.7)) * (0.5 * tt * backlit);
+    vec3 tinted = body / max(max(body.r, body.g), max(body.b, 1e-4));
+    return mix(vec3(1.0), tinted, 0.4) * (0.045 * r) + body * (0.11 * trt) + pow(body, vec3(0.7)) * (0.5 * tt * backlit);
 }
 
 void main()
@@ -58,7 +59,7 @@ void main()
     float length2 = dot(line, line);
     vec2 side = length2 > 1e-12 ? vec2(-line.y, line.x) * inversesqrt(length2) : vec2(1.0, 0.0);
     float width = mix(widths.x, widths.y, u * u) * tint.a;
-    out_side = vec4(side, 0.5 * width * pixels_at_one / max(clip.w, 1e-6), 1.0);
+    out_side = vec4(side, min(0.5 * width * pixels_at_one / max(clip.w, 1e-6), 4096.0), 1.0);   // w <= 0 behind the eye
 
     // colour of the fibre: dark root to light tip
     float k = clamp(u / max(2.0 * blend, 1e-3), 0.0, 1.0);
@@ -74,11 +75,11 @@ void main()
     float openness = mix(0.22, 1.0, smoothstep(0.0, 0.85, u));
 
     float sin_key = sqrt(max(1.0 - dot(t, key_direction) * dot(t, key_direction), 0.0));
-    float facing = clamp((dot(across, key_direction) + 0.35) / 1.35, 0.0, 1.0);
-    vec3 light = key_color * through * sin_key * mix(0.25, 1.0, facing) * 0.32;
+    float facing = clamp((dot(across, key_direction) + 0.2) / 1.2, 0.0, 1.0);
+    vec3 light = key_color * through * sin_key * mix(0.1, 1.0, facing) * 0.34;
     float sin_fill = sqrt(max(1.0 - dot(t, fill_direction) * dot(t, fill_direction), 0.0));
     light += fill_color * openness * sin_fill * clamp((dot(across, fill_direction) + 0.4) / 1.4, 0.0, 1.0) * 0.55;
-    light += mix(ground_color, sky_color, 0.5 + 0.5 * dot(across, up_direction)) * openness * 0.42;
+    light += mix(ground_color, sky_color, 0.5 + 0.5 * dot(across, up_direction)) * openness * 0.34;
     vec3 color = body * light;
 
     float gate = clamp(dot(n, key_direction) * 2.0 + 0.7, 0.0, 1.0);

@@ -59,7 +59,7 @@ class GuideDrawable:
 
     def upload_rows(self, lines: GuideLines, start: int, stop: int) -> None:
         """Upload the points of the guides from `start` to before `stop` again."""
-        self.textures.write(self.textures.points, lines.points.reshape(len(lines.points), -1), start, stop)
+        self.textures.write(self.textures.points, lines.points.reshape(-1, 3 * self.textures.per_strand), start, stop)
 
     def work_out(self, uniforms: dict[str, Any], samples: int) -> None:
         """Colour every point and lay its line out on the screen."""

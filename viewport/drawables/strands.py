@@ -15,7 +15,7 @@ from viewport.strand_textures import StrandTextures
 
 SHADOW_HAIRS = 150_000  # more than these are drawn into the light's maps as every second, third ... one, each heavier
 SHADOW_PIECES = 6  # a hair casts its shadow as this many straight pieces at least
-ABSORPTION = 0.55  # per width of hair over width of texel; below 1 as hair scatters light onwards
+ABSORPTION = 0.4  # per width of hair over width of texel; below 1 as hair scatters light onwards
 
 
 class StrandPrograms:
@@ -96,7 +96,7 @@ class CoatDrawable:
 
     def upload_rows(self, coat: Coat, start: int, stop: int) -> None:
         """Upload the points of the hairs from `start` to before `stop` again."""
-        self.textures.write(self.textures.points, coat.points.reshape(len(coat.points), -1), start, stop)
+        self.textures.write(self.textures.points, coat.points.reshape(-1, 3 * self.textures.per_strand), start, stop)
 
     def draw_depth(self, light_from_world: NDArray[np.float64]) -> None:
         """Draw the hairs as lines, depth alone, seen from the light."""

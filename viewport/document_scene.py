@@ -1,0 +1,74 @@
+"""From a document and its grown coats to what is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from core.document import Document
+from core.groom.children import Children
+from core.groom.groom import Coat as CoatRecord
+from core.groom.strands import GroomStrands, Strands
+from core.mesh.skin import Skin
+from viewport.scene import Coat, GuideLines, Look, Scene, Surface, skin_under
+
+SKIN = (0.36, 0.35, 0.34)
+DRAWN_POINTS = 16
+
+
+def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[int, Children]) -> Scene:
+    """The scene of every visible mesh (in the pose of its skin) and every coat in `children` (by groom id)."""
+    coats = {g.mesh_id: look_of(g.coat) for g in document.grooms if g.id in children}
+    surfaces = tuple(
+        Surface(
+            skins[item.id].points, skins[item.id].normals, skins[item.id].triangles.vertices,
+            skin_under(coats[item.id]) if item.id in coats else SKIN,
+        )
+        for item in document.meshes
+        if not item.hidden
+    )
+    hair = tuple(
+        Coat(children[g.id].points, children[g.id].ids, children[g.id].normals, look_of(g.coat))
+        for g in document.grooms
+        if g.id in children and len(children[g.id])
+    )
+    return Scene(surfaces, hair)
+
+
+def look_of(coat: CoatRecord) -> Look:
+    """How the hairs of a coat look."""
+    return Look(
+        root=coat.color_root, tip=coat.color_tip, root_width=coat.width_root, tip_width=coat.width_tip,
+    )
+
+
+def scene_of_strands(groom: GroomStrands) -> Scene:
+    """The scene of a groom file without its animal: hairs where it has some, else guides as hairs."""
+    if groom.children is not None and len(groom.children):
+        return Scene(coats=(_coat(groom.children),))
+    if groom.guides is not None and len(groom.guides):
+        points = resampled(groom.guides)
+        return Scene(guides=(GuideLines(points, np.zeros(len(points), np.uint8)),))
+    return Scene()
+
+
+def _coat(strands: Strands) -> Coat:
+    points = resampled(strands)
+    size = float(np.linalg.norm(np.ptp(strands.points, axis=0)))
+    width = float(np.median(strands.widths)) if strands.widths is not None else 0.0005 * size
+    ids = strands.ids if strands.ids is not None else np.arange(len(strands), dtype=np.int32)
+    normal = points[:, 1] - points[:, 0]
+    normal = (normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)).astype(np.float32)
+    look = Look(root_width=max(width, 1e-4 * size), tip_width=0.2 * max(width, 1e-4 * size))
+    return Coat(points, ids, normal, look)
+
+
+def resampled(strands: Strands) -> np.ndarray:
+    """(S, DRAWN_POINTS, 3) float32: points at even steps of the parameter of each strand, for drawing."""
+    starts = np.cumsum(strands.counts) - strands.counts
+    at = np.linspace(0.0, 1.0, DRAWN_POINTS)[None, :] * (strands.counts[:, None] - 1)
+    low = np.minimum(at.astype(np.int64), strands.counts[:, None] - 2)
+    share = (at - low)[..., None]
+    first = strands.points[starts[:, None] + low]
+    return np.ascontiguousarray(first * (1 - share) + strands.points[starts[:, None] + low + 1] * share, np.float32)
