@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.formats.gltf_accessors import Accessor, Buffer, BufferView, read_accessor
+from core.formats.mesh_pieces import join, unique_names
+from core.mesh.edges import reversed_corners
 from core.mesh.mesh import Mesh
-from core.mesh.repair import Polygons
+from core.mesh.polygons import Polygons
 from core.mesh.triangulate import triangulate
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -96,7 +98,7 @@ def read_gltf(path: Path) -> Polygons:
         raise UserError(f"{path.name} contradicts itself ({error}); export it again.") from None
     if not pieces:
         raise UserError(f"{path.name} has no triangles; export a polygon mesh.")
-    return _join(pieces)
+    return join(pieces)
 
 
 def write_glb(path: Path, mesh: Mesh) -> None:
@@ -195,15 +197,13 @@ def _buffer(path: Path, buffer: Buffer, chunk: bytes | None) -> bytes:
 
 def _pieces(path: Path, gltf: Gltf, buffers: list[bytes]) -> list[Polygons]:
     pieces: list[Polygons] = []
-    names: dict[str, int] = {}
     total = 0
     for node, world in _placed_nodes(path, gltf):
         if node.mesh is None:
             continue
         source = gltf.meshes[_row(node.mesh)]
         name = node.name or source.name or "mesh"
-        names[name] = names.get(name, 0) + 1
-        name = name if names[name] == 1 else f"{name}_{names[name]}"
+        of_node: list[Polygons] = []
         transform = np.eye(4) if node.skin is not None else world
         for primitive in source.primitives:
             for extension in UNREADABLE.keys() & primitive.extensions.keys():
@@ -215,8 +215,10 @@ def _pieces(path: Path, gltf: Gltf, buffers: list[bytes]) -> list[Polygons]:
             if total > MOST_CORNERS:
                 raise UserError(f"{path.name} shows more than {MOST_CORNERS // 3:,} triangles; export a smaller mesh.")
             if len(piece.counts):
-                pieces.append(piece)
-    return pieces
+                of_node.append(piece)
+        if of_node:
+            pieces.append(join(of_node))
+    return unique_names(pieces)
 
 
 def _placed_nodes(path: Path, gltf: Gltf) -> list[tuple[Node, NDArray[np.float64]]]:
@@ -286,8 +288,7 @@ def _primitive(
     if NGONS in primitive.extensions and len(triangles):
         counts, corners = _ngons(triangles)
     if np.linalg.det(world[:3, :3]) < 0:  # a mirrored node turns its faces over
-        firsts = np.cumsum(counts) - counts
-        corners = corners[np.repeat(2 * firsts + counts - 1, counts) - np.arange(len(corners))]
+        corners = corners[reversed_corners(counts)]
     uvs = None
     if "TEXCOORD_0" in primitive.attributes:
         by_vertex = get(primitive.attributes["TEXCOORD_0"], 2)
@@ -338,24 +339,3 @@ def _ngon_triangles(mesh: Mesh, split: NDArray[np.int64]) -> tuple[NDArray[np.in
                 before = first[0]
         at += count - 2
     return out, mesh.parts[cut.faces]
-
-
-def _join(pieces: list[Polygons]) -> Polygons:
-    """All pieces as one; pieces of the same name are one part."""
-    names: dict[str, int] = {}
-    base = 0
-    corners, parts = [], []
-    for piece in pieces:
-        outside = (piece.corners < 0) | (piece.corners >= len(piece.points))
-        corners.append(np.where(outside, -1, piece.corners + base))
-        parts.append(np.full(len(piece.counts), names.setdefault(piece.part_names[0], len(names)), np.int32))
-        base += len(piece.points)
-    uvs = None
-    if any(piece.uvs is not None for piece in pieces):
-        uvs = np.concatenate([
-            np.full((len(p.corners), 2), np.nan, np.float32) if p.uvs is None else p.uvs for p in pieces
-        ])  # fmt: skip
-    return Polygons(
-        np.concatenate([p.points for p in pieces]), np.concatenate([p.counts for p in pieces]),
-        np.concatenate(corners), uvs, np.concatenate(parts), tuple(names),
-    )  # fmt: skip

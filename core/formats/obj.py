@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.formats.text_numbers import BYTES, POWERS, parse_number, text_bytes
 from core.mesh.mesh import Mesh
-from core.mesh.repair import Polygons
+from core.mesh.polygons import Polygons
 
 NO_INDEX = -1  # a UV that was not given
 BAD_INDEX = -2  # an index that is no number, zero, or before the beginning

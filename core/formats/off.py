@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.formats.text_numbers import numbers, text_bytes
 from core.mesh.mesh import Mesh
-from core.mesh.repair import Polygons
+from core.mesh.polygons import Polygons
 
 
 def read_off(path: Path) -> Polygons:

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.formats.text_numbers import BYTES, numbers
 from core.mesh.mesh import Mesh
-from core.mesh.repair import Polygons
+from core.mesh.polygons import Polygons
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
     "double": "f8", "float64": "f8",
 }  # fmt: skip
+COUNT_TYPES = {word for word, kind in TYPES.items() if kind[0] in "iu"}
 HEADER_CAP = 1 << 16
 U_NAMES, V_NAMES = ("s", "u", "texture_u", "s0"), ("t", "v", "texture_v", "t0")
 
@@ -113,7 +114,7 @@ def _header(data: bytes, name: str) -> tuple[str, list[Element], int]:
                 pass
             case ["element", word, rows] if rows.isascii() and rows.isdigit() and len(rows) < 16:
                 elements.append((word, int(rows), []))
-            case ["property", "list", length, kind, word] if elements and TYPES.get(length, "f4")[0] in "iu" and kind in TYPES:
+            case ["property", "list", length, kind, word] if elements and length in COUNT_TYPES and kind in TYPES:
                 elements[-1][2].append(Property(word, TYPES[kind], TYPES[length]))
             case ["property", kind, word] if elements and kind in TYPES:
                 elements[-1][2].append(Property(word, TYPES[kind], None))

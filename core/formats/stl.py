@@ -11,7 +11,7 @@ from numba import njit, types
 from core.errors import UserError
 from core.formats.text_numbers import BYTES, POWERS, parse_number, text_bytes
 from core.mesh.mesh import Mesh
-from core.mesh.repair import Polygons
+from core.mesh.polygons import Polygons
 from core.mesh.triangulate import triangulate
 
 FACET = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -53,6 +53,13 @@ def next_corner(counts: NDArray[np.integer]) -> NDArray[np.int64]:
     return following
 
 
+def reversed_corners(counts: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Corner numbers that turn every face over: the corners of each face in the other order, (C,) int64."""
+    ends = np.cumsum(counts, dtype=np.int64)
+    total = int(ends[-1]) if len(ends) else 0
+    return np.repeat(2 * ends - counts - 1, counts) - np.arange(total)
+
+
 def is_closed(surface: Mesh | Triangles) -> bool:
     """True when every edge is used exactly twice, once in each direction: the surface has an inside."""
     if isinstance(surface, Triangles):

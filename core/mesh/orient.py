@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from core.mesh.edges import Edges, next_corner
+from core.mesh.edges import Edges, next_corner, reversed_corners
 
 
 def orient(
@@ -40,9 +40,7 @@ def orient(
         leaking[piece[one[(flip[one] != flip[two]) != clash]]] = True  # a surface with one side has no inside
     flip ^= _inside_out(points, counts, corners, face_of_corner, flip, piece, ~leaking)[piece]
     if flip.any():
-        ends = np.cumsum(counts)
-        mirrored = (ends - counts)[face_of_corner] + ends[face_of_corner] - 1 - np.arange(len(corners))
-        source = np.where(flip[face_of_corner], mirrored, np.arange(len(corners)))
+        source = np.where(flip[face_of_corner], reversed_corners(counts), np.arange(len(corners)))
         corners[:] = corners[source]
         if uvs is not None:
             uvs[:] = uvs[source]

@@ -13,6 +13,7 @@ from core.errors import UserError
 from core.mesh.edges import Edges, next_corner
 from core.mesh.mesh import Mesh
 from core.mesh.orient import orient
+from core.mesh.polygons import Polygons
 
 LARGEST = 1e12  # metres; beyond this squared float32 distances overflow, so such a vertex is as good as NaN
 
@@ -30,24 +31,6 @@ PROBLEMS = {
     "islands": "separate pieces",
     "missing_uvs": "faces without UVs",
 }
-
-
-class Polygons(NamedTuple):
-    """The faces of a file before anything is believed.
-
-    points : (V, 3) float64, any values.
-    counts : (F,) int64, corners of each face, any values >= 0.
-    corners : (C,) int64, any values.
-    uvs : (C, 2) float32, NaN where a corner has none, or None.
-    parts : (F,) int32 rows of `part_names`.
-    """
-
-    points: np.ndarray
-    counts: np.ndarray
-    corners: np.ndarray
-    uvs: np.ndarray | None
-    parts: np.ndarray
-    part_names: tuple[str, ...]
 
 
 class Repaired(NamedTuple):
@@ -69,7 +52,7 @@ def repair(polygons: Polygons) -> Repaired:
     """Make a sound mesh of any polygons.
 
     Faces that cannot be used are left out; coincident vertices are joined only where that pairs two open
-    edges (so files without shared vertices become surfaces, while touching pieces stay apart); faces of a
+    edges of one part (so files without shared vertices become surfaces, while touching pieces stay apart); faces of a
     piece are turned to agree with most of it, and outwards where the piece is closed. Vertices keep their
     order; those joined to an earlier one disappear. A vertex that is not finite is moved to the middle of the
     others. Faces without area stay, because leaving them out would open a seam.
@@ -84,7 +67,7 @@ def repair(polygons: Polygons) -> Repaired:
     kept = _usable_faces(polygons, bad, met)
     faces = _take_faces(polygons, kept)
     edges = Edges.of(faces.counts, faces.corners, len(points))
-    vertex_of_source = _join_open_edges(points, faces.counts, faces.corners, edges, met)
+    vertex_of_source = _join_open_edges(points, faces.counts, faces.corners, faces.parts, edges, met)
     stays = vertex_of_source == np.arange(len(points))
     if not stays.all():
         vertex_of_source = (np.cumsum(stays) - 1)[vertex_of_source]
@@ -193,14 +176,16 @@ def _join_open_edges(
     points: NDArray[np.float64],
     counts: NDArray[np.int64],
     corners: NDArray[np.int64],
+    parts: NDArray[np.int32],
     edges: Edges,
     met: dict[str, int],
 ) -> NDArray[np.int64]:
-    """Where each vertex goes, (V,): itself, or the first of those it coincides with along a pair of open edges."""
+    """Where each vertex goes, (V,): itself, or the first of those it coincides with along two open edges of a part."""
     same = np.arange(len(points))
     open_ = edges.order[(edges.uses == 1)[edges.group]]
     if not len(open_):
         return same
+    part = np.repeat(parts, counts)[open_]
     ends = np.stack([corners[open_], corners[next_corner(counts)[open_]]], axis=1)
     used = np.unique(ends)
     place = points[used] + 0.0  # -0.0 and 0.0 are the same place
@@ -213,7 +198,8 @@ def _join_open_edges(
     at = place_of[ends]
     swap = at[:, 0] > at[:, 1]
     ends[swap], at[swap] = ends[swap][:, ::-1], at[swap][:, ::-1]
-    order = np.lexsort((at[:, 1], at[:, 0]))
+    at = np.column_stack([at, part])  # what lies in two parts was kept apart by somebody
+    order = np.lexsort(at.T)
     ends, at = ends[order], at[order]
     fresh = np.append(True, (at[1:] != at[:-1]).any(axis=1))
     starts = np.flatnonzero(fresh)
