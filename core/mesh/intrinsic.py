@@ -36,7 +36,7 @@ from core.mesh.intrinsic_points import (
     read_all,
     read_changed,
 )
-from core.mesh.intrinsic_removal import make_ring, remove_vertex, remove_vertices
+from core.mesh.intrinsic_removal import LARGEST_RING, make_ring, remove_vertex, remove_vertices
 from core.random import rand
 
 FEWEST = 4  # a piece of skin needs this many vertices that stay
@@ -180,6 +180,8 @@ class SurfaceSites:
         )
         self._kind = np.zeros(vertices, np.uint8)
         self._label = np.full(vertices, -1, np.int32)
+        self._piece = np.zeros(vertices, np.int32)
+        self._piece[: skin.vertices] = skin.component
 
     def _on_skin(
         self, triangle: NDArray[np.int32], bary: NDArray[np.float64]
@@ -214,6 +216,7 @@ class SurfaceSites:
         sites = np.bincount(site_piece, minlength=skin.components)
         stay = sites + np.bincount(skin.component[phantom], minlength=skin.components)
         self._sites_on = sites
+        self._piece[self._vertex] = site_piece
         order = mesh[np.argsort(rand(mesh, self._seed), kind="stable")]
         order = order[~phantom[order]]
         piece = skin.component[order]
@@ -233,6 +236,93 @@ class SurfaceSites:
         """A mesh vertex of each face of the manifold as it was."""
         return self._skin.origin[3 * face]
 
+    # -- one site more or less ----------------------------------------------------------------------------
+
+    def add_site(self, triangle: int, barycentric: ArrayLike) -> Rebound:
+        """Insert a site as the last row; the points whose binding changed.
+
+        On a piece of skin that had no site everything is built anew.
+        """
+        bary = np.array(barycentric, np.float64).reshape(1, 3)
+        tri = np.array([triangle], np.int32)
+        self._site_triangle = np.concatenate([self._site_triangle, tri])
+        self._site_bary = np.concatenate([self._site_bary, bary])
+        self._nearest_site = None
+        face, weights = self._on_skin(tri, bary)
+        piece = int(self._skin.component[self._net_vertex(face)[0]])
+        if self._sites_on[piece] == 0:
+            return self._rebuild()
+        if self._used_vertices == len(self._kind) or self._net.tally[FREE] < 2:
+            self._grow()
+        net, v = self._net, self._used_vertices
+        corners = self._skin.origin[3 * int(face[0]) : 3 * int(face[0]) + 3]
+        out = np.empty(3)
+        f = find_place(net, self._count, corners, weights[0], out)
+        if f < 0 or not insert_vertex(net, v, f, out[0], out[1], out[2]):
+            return self._rebuild()
+        self._used_vertices += 1
+        self._vertex = np.append(self._vertex, np.int32(v))
+        self._kind[v] = SITE
+        self._label[v] = self.sites - 1
+        self._piece[v] = piece
+        self._sites_on[piece] += 1
+        self._stay[piece] += 1
+        self.edits += 1
+        return self._changes()
+
+    def remove_site(self, row: int) -> Rebound:
+        """Take a site away; the points whose binding changed. Rows after it count one less from now on, here and in
+        what is returned: whoever stores sites of other points must lower those above `row` likewise."""
+        if self.sites < 2:
+            raise ValueError("the last site cannot be taken away")
+        v = int(self._vertex[row])
+        self._vertex = np.delete(self._vertex, row)
+        self._site_triangle = np.delete(self._site_triangle, row)
+        self._site_bary = np.delete(self._site_bary, row, axis=0)
+        self._nearest_site = None
+        piece = int(self._piece[v])
+        if self._sites_on[piece] == 1:
+            return self._rebuild()
+        self._label[self._label > row] -= 1
+        self._sites_on[piece] -= 1
+        few = self._stay[piece] <= FEWEST
+        if not few and remove_vertex(self._net, self._ring, v, self._count + v, LARGEST_RING, True):
+            self._kind[v] = 0
+            self._label[v] = -1
+            self._stay[piece] -= 1
+        else:  # it stays as a helper with its neighbour's label
+            self._kind[v] = HELPER
+            self._label[v] = -2
+        self.edits += 1
+        return self._changes()
+
+    def _rebuild(self) -> Rebound:
+        self._build()
+        bound = self.binding()
+        return Rebound(np.arange(self._count, dtype=np.int32), bound.sites, bound.weights)
+
+    def _grow(self) -> None:
+        """Room for as many sites again."""
+        room = self.sites + SPARE
+        net = self._net
+        faces = len(net.head)
+
+        def more(array: NDArray, count: int, fill: int = 0) -> NDArray:
+            return np.concatenate([array, np.full((count, *array.shape[1:]), fill, array.dtype)])
+
+        free = more(net.free, 2 * room)
+        unused = int(net.tally[FREE])
+        free[unused : unused + 2 * room] = np.arange(faces + 2 * room - 1, faces - 1, -1)
+        net.tally[FREE] += 2 * room
+        self._net = Net(
+            more(net.origin, 6 * room, -1), more(net.twin, 6 * room, -1), more(net.length, 6 * room),
+            more(net.first, room, -1), more(net.head, 2 * room, -1), more(net.follow, room, -1),
+            more(net.home, room, -1), more(net.bary, room), more(net.queued, 6 * room), more(net.stack, 6 * room),
+            more(net.changed, 2 * room), more(net.touched, 2 * room), free, net.tally,
+        )
+        self._kind, self._label = more(self._kind, room), more(self._label, room, -1)
+        self._piece = more(self._piece, room)
+
     # -- reading ------------------------------------------------------------------------------------------
 
     def _relabel(self) -> None:
@@ -245,7 +335,7 @@ class SurfaceSites:
         weights = np.empty((n, 3), np.float32)
         order = np.empty(n, np.int32)
         trouble = np.zeros(n, np.uint8)
-        read_all(self._net, self._kind, self._label, self._given, n, sites, weights, order, trouble)
+        read_all(self._net, self._kind, self._label, self._given, n, order, sites, weights, trouble)
         lost = np.flatnonzero(trouble == 2)
         if len(lost):
             sites[lost] = self._nearest(lost)[:, None]
@@ -264,6 +354,8 @@ class SurfaceSites:
 
     def _changes(self) -> Rebound:
         n = self._count
+        if (self._kind[: self._used_vertices] > SITE).any():
+            self._relabel()
         rows = np.empty(n, np.int32)
         sites = np.empty((n, 3), np.int32)
         weights = np.empty((n, 3), np.float32)

@@ -12,7 +12,6 @@ _I2 = types.Array(types.int32, 2, "C")
 _S2 = types.Array(types.float32, 2, "C")
 
 SITE, PHANTOM, HELPER = 1, 2, 3  # what a vertex that stays is
-FEW = 1e-9
 
 
 @njit(types.void(NET, I1, F2, types.int64), cache=True, nogil=True)
@@ -61,89 +60,88 @@ def label_helpers(net, kind, label, distance):  # type: ignore[no-untyped-def]
     return other
 
 
-@njit(types.int64(NET, B1, I1, types.int64, _I2, _S2, types.int64), cache=True, nogil=True)
-def read_point(net, kind, label, p, sites, weights, row):  # type: ignore[no-untyped-def]
-    """Write the binding of point `p` to a row: 0 bound to sites, 1 through a helper, 2 to no site at all.
+@njit(
+    types.int64(NET, B1, I1, _RI1, types.int64, types.int64, types.int64, types.boolean, I1, _I2, _S2, B1),
+    cache=True, nogil=True,
+)
+def read_face(net, kind, label, given, count, f, at, packed, rows, sites, weights, trouble):  # type: ignore[no-untyped-def]
+    """Write the binding of the points of face `f`, the first as entry `at` of `rows`; returns the entry after the last.
 
-    Phantoms are dropped and the rest renormalised; corners that are one site are added up.
+    With `packed` a binding goes to the entry's place, else to the row the point was given in. Phantoms are dropped
+    and the rest renormalised, corners that are one site added up. `trouble`: 1 bound through a helper, 2 to nothing.
     """
-    f = net.home[p]
-    a, b, c = -1, -1, -1
-    wa, wb, wc = 0.0, 0.0, 0.0
-    through = 0
-    if f >= 0:
-        for phantoms in range(2):  # phantoms count only where there is nothing else
-            for k in range(3):
-                v = net.origin[3 * f + k]
-                w = net.bary[p, k]
-                s = label[v]
-                if s < 0 or (kind[v] == PHANTOM) != (phantoms == 1):
-                    continue
-                if kind[v] == HELPER and w > 0.0:
-                    through = 1
-                if a == s or a < 0:
-                    a = s
-                    wa += w
-                elif b == s or b < 0:
-                    b = s
-                    wb += w
-                else:
-                    c = s
-                    wc += w
-            if wa + wb + wc > FEW:
-                break
-    if a < 0:
+    place = np.full(3, -1, np.int64)  # which of the three sites each corner is
+    name = np.full(3, -1, np.int64)
+    used, helper = 0, False
+    for phantoms in range(2):
         for k in range(3):
-            sites[row, k] = 0
-            weights[row, k] = 1.0 if k == 0 else 0.0
-        return 2
-    total = wa + wb + wc
-    scale = 1.0 / total if total > 0.0 else 0.0
-    if total <= 0.0:
-        wa, scale = 1.0, 1.0
-    sites[row, 0] = a
-    sites[row, 1] = b if b >= 0 else a
-    sites[row, 2] = c if c >= 0 else a
-    weights[row, 0], weights[row, 1], weights[row, 2] = wa * scale, wb * scale, wc * scale
-    return through
-
-
-@njit(types.int64(NET, B1, I1, _RI1, types.int64, _I2, _S2, I1, B1), cache=True, nogil=True)
-def read_all(net, kind, label, given, count, sites, weights, order, trouble):  # type: ignore[no-untyped-def]
-    """Write the binding of points 0 .. count, in given order, and the order sorted by face; how many have a face."""
-    at = 0
-    for f in range(len(net.head)):
-        p = net.head[f]
-        while p >= 0:
-            if p < count:
-                row = given[p]
-                trouble[row] = read_point(net, kind, label, p, sites, weights, row)
-                order[at] = row
-                at += 1
-            p = net.follow[p]
-    for p in range(count):
-        if net.home[p] < 0:
-            row = given[p]
-            trouble[row] = read_point(net, kind, label, p, sites, weights, row)
-            order[at] = row
+            v = net.origin[3 * f + k]
+            s = label[v]
+            if s < 0 or (kind[v] == PHANTOM) != (phantoms == 1) or (phantoms == 1 and used > 0 and name[0] >= 0):
+                continue
+            helper = helper or kind[v] == HELPER
+            for m in range(3):
+                if name[m] < 0:
+                    name[m] = s
+                    used += 1
+                if name[m] == s:
+                    place[k] = m
+                    break
+    p = net.head[f]
+    while p >= 0:
+        if p < count:
+            rows[at] = given[p]
+            row = at if packed else given[p]
+            w0, w1, w2 = 0.0, 0.0, 0.0
+            for k in range(3):
+                w = net.bary[p, k]
+                if place[k] == 0:
+                    w0 += w
+                elif place[k] == 1:
+                    w1 += w
+                elif place[k] == 2:
+                    w2 += w
+            total = w0 + w1 + w2
+            if total < 1e-12:
+                w0, w1, w2, total = 1.0, 0.0, 0.0, 1.0
+            sites[row, 0] = max(name[0], 0)
+            sites[row, 1] = max(name[1] if name[1] >= 0 else name[0], 0)
+            sites[row, 2] = max(name[2] if name[2] >= 0 else name[0], 0)
+            weights[row, 0], weights[row, 1], weights[row, 2] = w0 / total, w1 / total, w2 / total
+            trouble[row] = 2 if name[0] < 0 else (1 if helper else 0)
             at += 1
+        p = net.follow[p]
     return at
 
 
 @njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
+def read_all(net, kind, label, given, count, order, sites, weights, trouble):  # type: ignore[no-untyped-def]
+    """Write the binding of points 0 .. count, in given order, and the order sorted by face; how many have a face."""
+    at = 0
+    for f in range(len(net.head)):
+        if net.head[f] >= 0:
+            at = read_face(net, kind, label, given, count, f, at, False, order, sites, weights, trouble)
+    found = at
+    for p in range(count):
+        if net.home[p] < 0:
+            row = given[p]
+            sites[row] = 0
+            weights[row, 0], weights[row, 1], weights[row, 2] = 1.0, 0.0, 0.0
+            trouble[row] = 2
+            order[at] = row
+            at += 1
+    return found
+
+
+@njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
 def read_changed(net, kind, label, given, count, rows, sites, weights, trouble):  # type: ignore[no-untyped-def]
-    """The same for the points of touched faces only, which are then forgotten; returns how many."""
+    """The same for the points of touched faces only, packed, and forget those faces; returns how many."""
     at = 0
     for i in range(net.tally[TOUCHED]):
         f = net.touched[i]
         net.changed[f] = 0
-        p = net.head[f]
-        while p >= 0:
-            if p < count:
-                rows[at] = given[p]
-                trouble[at] = read_point(net, kind, label, p, sites, weights, at)
-                at += 1
-            p = net.follow[p]
+        if net.head[f] >= 0:
+            at = read_face(net, kind, label, given, count, f, at, True, rows, sites, weights, trouble)
     net.tally[TOUCHED] = 0
     return at
 
