@@ -159,7 +159,8 @@ def _write_curves(parent: Any, strands: Strands, role: str, up: str, metres_per_
         centimetres = _lend(imath.FloatArrayFromBuffer, scaled(strands.widths, CENTIMETRES, divide=True))
         param("Float", "groom_width", scope.kVertexScope, centimetres)
     if strands.colors is not None:
-        param("C3f", "groom_color", scope.kVertexScope, _color_array(strands.colors))
+        # vectors, not colours: Unreal asks for V3f, and Alembic tells the two apart
+        param("V3f", "groom_color", scope.kVertexScope, _lend(imath.V3fArrayFromBuffer, strands.colors))
 
 
 def _lend(from_buffer: Any, array: NDArray[Any]) -> Any:
@@ -169,15 +170,6 @@ def _lend(from_buffer: Any, array: NDArray[Any]) -> Any:
     if len(array):
         return from_buffer(np.ascontiguousarray(array))
     return getattr(imath, from_buffer.__name__.removesuffix("FromBuffer"))(0)
-
-
-def _color_array(colors: NDArray[Any]) -> Any:
-    import imath
-
-    made = imath.C3fArray(len(colors))
-    if len(colors):
-        np.asarray(made)[:] = colors
-    return made
 
 
 def _write_mesh(parent: Any, mesh: Mesh, up: str, metres_per_unit: float) -> None:

@@ -134,9 +134,11 @@ def write_groom(
         kind.write(beside, groom, mesh, axis, metres, maker())
 
 
-def curve_info(path: str | Path, unit: str | None = None, up: str | None = None) -> dict[str, Any]:
+def curve_info(
+    path: str | Path, unit: str | None = None, up: str | None = None, sandboxed: bool = True
+) -> dict[str, Any]:
     """What a curve file holds, in words and numbers JSON can say."""
-    file = read_curve_file(path, unit, up)
+    file = read_curve_file(path, unit, up, sandboxed)
     bundles = {"guides": file.groom.guides, "hairs": file.groom.children}
     present = [strands for strands in bundles.values() if strands is not None]
     points = np.concatenate([strands.points for strands in present])
