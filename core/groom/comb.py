@@ -51,7 +51,7 @@ def comb(
     lay : 0 .. 2, how fast hair turns along the stroke; 0 only bends and keeps curls.
     flat : fraction of the radius within which the ring has its full weight.
     tip_first : 0 combs the whole length, 1 mostly the tips.
-    lift : radians by which laid hair stands off the skin.
+    lift : radians by which laid hair stands off the skin, 0 .. 1.3.
     max_bend : radians a joint may be folded to (it is never opened by force: a sharper bend stays).
     clearance : distance kept from the skin as a fraction of the strand's length.
     mask : (G,) strength of each strand, e.g. `facing` or one side of a parting; all 1 when None.
@@ -69,6 +69,7 @@ def comb(
         raise UserError("The comb's path and radius must be finite numbers.")
     if len(way) < 2 or radius <= 0.0 or len(guides) == 0:
         return guides
+    lift = min(max(lift, 0.0), 1.3)
     reach = editable(guides).astype(np.float32) * np.float32(min(max(strength, 0.0), 1.0))
     if mask is not None:
         reach *= np.asarray(mask, np.float32)

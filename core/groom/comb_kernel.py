@@ -134,6 +134,17 @@ def _lay(q, j, vx, vy, vz, nx, ny, nz, rate):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _normal_near(x, i, frames, row, collides, values, origin, cell):  # type: ignore[no-untyped-def]
+    """Distance and normal (d, nx, ny, nz) of the skin nearest to x[i]; far from it none and that of the root."""
+    if collides:
+        gap, nx, ny, nz = sample_gradient(values, origin, cell, x[i, 0], x[i, 1], x[i, 2])
+        size = math.sqrt(nx * nx + ny * ny + nz * nz)
+        if size >= LEAST_GRADIENT:
+            return gap, nx / size, ny / size, nz / size
+    return 1e30, np.float64(frames[row, 2, 0]), np.float64(frames[row, 2, 1]), np.float64(frames[row, 2, 2])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _limit_bends(q, first, limits):  # type: ignore[no-untyped-def]
     """Open every joint from segment `first` on that is folded more than its limit (a cosine), root to tip."""
     for j in range(max(1, first), q.shape[0]):
@@ -178,7 +189,7 @@ def comb_rows(  # type: ignore[no-untyped-def]
     freedom, limits = np.empty(joints), np.empty(joints)
     screen = np.empty((count, 2))
     bend_cosine = math.cos(max_bend)
-    sin_lift = math.sin(lift)
+    sin_lift, tan_lift = math.sin(lift), math.tan(lift)
     collides = values.shape[0] > 1
     low_x, high_x = path[:, 0].min() - radius, path[:, 0].max() + radius
     low_y, high_y = path[:, 1].min() - radius, path[:, 1].max() + radius
@@ -279,6 +290,15 @@ def comb_rows(  # type: ignore[no-untyped-def]
                 ux, uy, uz = dx / size, dy / size, dz / size
                 if grip > 0.0:
                     m = min(1.0, grip * strength) * strongest
+                    if sin_lift > 0.0:  # the ring rises as it goes, or its pull would press down what lift raises
+                        top = 1
+                        for i in range(2, count):
+                            if w[i] > w[top]:
+                                top = i
+                        nx, ny, nz = _normal_near(x, top, frames, row, collides, values, origin, cell)[1:]
+                        rise = (size * tan_lift) - (dx * nx + dy * ny + dz * nz)
+                        if rise > 0.0:
+                            dx, dy, dz = dx + rise * nx, dy + rise * ny, dz + rise * nz
                     _grip(x, q, w, arcs, freedom, m * dx, m * dy, m * dz, 1.0)
                 if lay > 0.0:
                     rate = lay * strength * math.sqrt(step_2) / radius
@@ -287,19 +307,7 @@ def comb_rows(  # type: ignore[no-untyped-def]
                         carried = max(0.5 * (w[j] * ahead[j] + w[j + 1] * ahead[j + 1]), CARRY * carried)
                         if carried <= 0.0 or freedom[j] <= 0.0:
                             continue
-                        gap = 1e30
-                        nx = ny = nz = 0.0
-                        if collides:
-                            gap, nx, ny, nz = sample_gradient(values, origin, cell, x[j, 0], x[j, 1], x[j, 2])
-                        size = math.sqrt(nx * nx + ny * ny + nz * nz)
-                        if size >= LEAST_GRADIENT:
-                            nx, ny, nz = nx / size, ny / size, nz / size
-                        else:
-                            gap = 1e30
-                            nx, ny, nz = (
-                                np.float64(frames[row, 2, 0]), np.float64(frames[row, 2, 1]),
-                                np.float64(frames[row, 2, 2]),
-                            )
+                        gap, nx, ny, nz = _normal_near(x, j, frames, row, collides, values, origin, cell)
                         # into the skin no further than the rest of the strand can sink
                         rise = ux * nx + uy * ny + uz * nz
                         wanted = max(rise, -max(gap, 0.0) / (total - arcs[j] + 1e-12))

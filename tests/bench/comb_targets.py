@@ -199,9 +199,11 @@ TARGETS = (
 Comb = Callable[[Guides, View, Array, float, bool], Guides]
 
 
-def passes_needed(target: Target, sphere: bool, comb: Comb, seed: int) -> tuple[int, float, Guides]:
+def passes_needed(
+    target: Target, sphere: bool, comb: Comb, seed: int, strands: int = 500
+) -> tuple[int, float, Guides]:
     """Passes until the target is reached (PASSES + 1 when it never is), the error of the last, the guides."""
-    guides = hair(seed, sphere, target.half, target.upright)
+    guides = hair(seed, sphere, target.half, target.upright, strands)
     start = guides.points.astype(np.float64)
     view = orthographic(target.side_view)
     error = np.inf
