@@ -1,0 +1,5 @@
+"""``python -m app`` is ``filoplume``."""
+
+from app.cli import main
+
+main()

@@ -1,0 +1,85 @@
+"""The command line: a table of commands, and one place where errors become words and exit codes.
+
+Exit codes: 0 done, 1 could not (one sentence on standard error), 2 wrong usage, 130 stopped by Ctrl-C.
+With ``--json`` standard output carries one object and nothing else: the result, or ``{"error": "..."}``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+import traceback
+
+import click
+import typer
+
+from core.errors import UserError
+
+# name of the command -> module of app.commands that holds a function `command`; order is the order of --help
+COMMANDS = ("groom", "convert", "info", "check", "render", "run", "bench", "doctor", "demo")
+
+
+def build() -> typer.Typer:
+    """The typer application with every command."""
+    cli = typer.Typer(
+        name="filoplume",
+        help="Groom hair on real animals, from the command line. Documents, meshes and coats in; coats and pictures out.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    for name in COMMANDS:
+        module = importlib.import_module(f"app.commands.{name}")
+        cli.command(name, no_args_is_help=name not in ("bench", "doctor", "demo"))(module.command)
+    return cli
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run one command and leave with its exit code."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    as_json = "--json" in arguments
+    try:
+        code = typer.main.get_command(build())(args=arguments, prog_name="filoplume", standalone_mode=False) or 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        error.show()
+        code = 2
+    except click.UsageError as error:
+        if as_json:
+            print(json.dumps({"error": error.format_message()}))
+        error.show()
+        code = 2
+    except click.exceptions.Exit as error:
+        code = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        code = _fail("stopped; nothing half-written was left", as_json, 130)
+    except UserError as error:
+        code = _fail(str(error), as_json, 1)
+    except BrokenPipeError:  # the reader of a pipe went away: not an error worth words
+        sys.stdout = open(os.devnull, "w")
+        code = 1
+    except MemoryError:
+        code = _fail("there is not enough memory for this; try fewer hairs or a lighter mesh", as_json, 1)
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        code = _fail(f"{(error.strerror or str(error)).lower()}{where}", as_json, 1)
+    except Exception as error:
+        if os.environ.get("FILOPLUME_DEBUG"):
+            traceback.print_exc()
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{os.path.basename(where.filename)}:{where.lineno}"
+        code = _fail(
+            f"this is a fault of filoplume ({type(error).__name__} at {place}: {error}); "
+            "FILOPLUME_DEBUG=1 shows the whole trace", as_json, 1,
+        )
+    raise SystemExit(code)
+
+
+def _fail(sentence: str, as_json: bool, code: int) -> int:
+    sentence = " ".join(sentence.split())
+    if as_json:
+        print(json.dumps({"error": sentence}))
+    print(f"filoplume: {sentence}", file=sys.stderr)
+    return code

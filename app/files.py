@@ -1,0 +1,157 @@
+"""Any file the program knows, whatever it holds: described, checked, converted, drawn.
+
+USD and Alembic files may hold a groom or only meshes; curves are looked for first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.deliver import deliver, draw, draw_strands, posed_document
+from core.document import Document, MeshObject
+from core.errors import UserError
+from core.evaluator import Evaluator
+from core.formats import curve_file, mesh_file, project, recovery
+from core.formats import journal as journal_file
+from core.formats.curve_file import CurveFile
+from core.groom.grow import grow
+
+Say = Callable[[str], None]
+PROJECT = (".filo", ".filo1")
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """What a file holds, as plain JSON values: at least kind, parts, vertices, faces, problems, guides, hairs."""
+    _must_exist(path)
+    if path.suffix.lower() in PROJECT:
+        return project.project_info(path)
+    curves = _curves(path)
+    if curves is not None:
+        return curve_file.curve_info(path)
+    return mesh_file.mesh_info(path)
+
+
+def troubles(path: Path) -> list[str]:
+    """Everything wrong with a file, one sentence each; empty when it is whole."""
+    _must_exist(path)
+    suffix = path.suffix.lower()
+    if suffix in PROJECT:
+        return project.check_project(path)
+    if suffix in journal_file.SUFFIXES:
+        return recovery.check_journal(path)
+    try:
+        curves = _curves(path)
+        if curves is not None:
+            return _curve_troubles(curves)
+        return [f"{kind.replace('_', ' ')}: {count}" for kind, count in mesh_file.mesh_info(path)["problems"].items()]
+    except UserError as error:
+        return [str(error)]
+
+
+def convert(source: Path, target: Path, unit: str | None, up: str | None, say: Say) -> dict[str, Any]:
+    """Convert a file; returns counts of what was written."""
+    _must_exist(source)
+    suffix = target.suffix.lower()
+    if source.suffix.lower() in PROJECT:
+        return _convert_document(project.read_project(source).document, target)
+    curves = _curves(source, unit, up)
+    if curves is not None:
+        for note in curves.notes:
+            say(note)
+        if suffix in PROJECT:
+            raise UserError("a coat without its animal cannot become a project; groom the mesh, then comb to this coat")
+        curve_file.write_groom(target, curves.groom)
+        return {"guides": _count(curves.groom.guides), "hairs": _count(curves.groom.children)}
+    mesh = mesh_file.read_mesh(source, unit=unit, up=up, say=say)
+    if suffix in PROJECT:
+        project.write_project(target, Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),)))
+    else:
+        mesh_file.write_mesh(target, mesh.mesh)
+    return {"vertices": len(mesh.mesh.points), "faces": len(mesh.mesh.counts)}
+
+
+def draw_file(
+    path: Path, png: Path, size: tuple[int, int], view: str, frame: float | None, say: Say
+) -> None:
+    """Draw whatever `path` holds into `png`."""
+    _must_exist(path)
+    evaluator = Evaluator()
+    if path.suffix.lower() in PROJECT:
+        document = project.read_project(path).document
+    else:
+        curves = _curves(path)
+        if curves is not None:
+            draw_strands(png, curves.groom, size, view)
+            return
+        mesh = mesh_file.read_mesh(path, say=say)
+        document = Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),))
+    skins = posed_document(document, frame, evaluator)
+    children = {g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id]) for g in document.grooms}
+    draw(png, document, children, evaluator, size, view, skins=skins)
+
+
+def _convert_document(document: Document, target: Path) -> dict[str, Any]:
+    suffix = target.suffix.lower()
+    meshes_only = suffix in mesh_file.WRITE_SUFFIXES and suffix not in curve_file.WRITE_SUFFIXES
+    if meshes_only or (not document.grooms and suffix not in PROJECT):
+        if not document.meshes:
+            raise UserError("this document is empty")
+        mesh = document.meshes[0].mesh
+        mesh_file.write_mesh(target, mesh)
+        return {"vertices": len(mesh.points), "faces": len(mesh.counts)}
+    evaluator = Evaluator()
+    meshes = {item.id: item.mesh for item in document.meshes}
+    children = {}
+    if suffix not in PROJECT:
+        first = document.grooms[0]
+        children = {first.id: grow(first, meshes[first.mesh_id], evaluator)}
+    deliver(target, document, children)
+    return {
+        "guides": sum(len(g.guides) for g in document.grooms),
+        "hairs": sum(len(c) for c in children.values()) if children else sum(g.coat.count for g in document.grooms),
+    }
+
+
+def _curves(path: Path, unit: str | None = None, up: str | None = None) -> CurveFile | None:
+    """The groom in a file, None when it is a mesh file or has no curves."""
+    suffix = path.suffix.lower()
+    if suffix not in curve_file.READ_SUFFIXES:
+        return None
+    if suffix not in mesh_file.READ_SUFFIXES:
+        return curve_file.read_curve_file(path, unit, up)
+    try:
+        return curve_file.read_curve_file(path, unit, up)
+    except UserError as error:
+        if "no curves" in str(error):
+            return None
+        raise
+
+
+def _curve_troubles(curves: CurveFile) -> list[str]:
+    found = []
+    for role, strands in (("guides", curves.groom.guides), ("hairs", curves.groom.children)):
+        if strands is None:
+            continue
+        if strands.ids is not None and len(np.unique(strands.ids)) != len(strands):
+            found.append(f"{role}: ids are used twice")
+        starts = np.cumsum(strands.counts) - strands.counts
+        spans = np.linalg.norm(np.diff(strands.points.astype(np.float64), axis=0), axis=1)
+        inner = np.ones(max(len(strands.points) - 1, 0), bool)
+        inner[starts[1:] - 1] = False
+        empty = int((np.add.reduceat(np.where(inner, spans, 0.0), starts) <= 0).sum()) if len(spans) else 0
+        if empty:
+            found.append(f"{role}: {empty} curves have no length")
+    return found
+
+
+def _count(strands: Any) -> int:
+    return 0 if strands is None else len(strands)
+
+
+def _must_exist(path: Path) -> None:
+    if not path.is_file():
+        raise UserError(f"there is no file {path}" if not path.exists() else f"{path} is a folder; name a file")
