@@ -80,7 +80,7 @@ def read_project(path: str | os.PathLike[str], hashes: ArrayHashes | None = None
         document = decode_part(envelope, "document", Document, arrays)
         workspace = decode_part(envelope, "workspace", Workspace, arrays)
     except (OSError, *_BROKEN) as error:
-        raise UserError(_sentence(name, error)) from error
+        raise UserError(_sentence(path, error)) from error
     found = problems(document)
     if found:
         raise UserError(f"{name} cannot be opened: {found[0]}")
@@ -108,7 +108,7 @@ def check_project(path: str | os.PathLike[str]) -> list[str]:
             decode_part(envelope, "workspace", Workspace, arrays)
             found.extend(problems(decode_part(envelope, "document", Document, arrays)))
     except (OSError, *_BROKEN) as error:
-        found.append(_sentence(Path(path).name, error))
+        found.append(_sentence(path, error))
     return found
 
 
@@ -174,8 +174,10 @@ def _data_offset(file: Any, info: zipfile.ZipInfo) -> int:
 def _open_zip(file: Any) -> zipfile.ZipFile:
     """Open and check the list of members: only ours, stored, once each, within the file."""
     size = file.seek(0, os.SEEK_END)
-    _check_directory(file, size)
+    announced = _check_directory(file, size)
     archive = zipfile.ZipFile(file)
+    if len(archive.infolist()) != announced:
+        raise ValueError("its list of members is damaged")
     names: set[str] = set()
     total = 0
     for info in archive.infolist():
@@ -194,18 +196,22 @@ def _open_zip(file: Any) -> zipfile.ZipFile:
     return archive
 
 
-def _check_directory(file: Any, size: int) -> None:
-    """Refuse an over-long list of members before zipfile makes an object of each; looks where zipfile looks."""
+def _check_directory(file: Any, size: int) -> int:
+    """Refuse an over-long list of members before zipfile makes an object of each; looks where zipfile looks.
+
+    Returns how many members the list is said to have.
+    """
     file.seek(max(0, size - 65_557 - 76))
     tail = file.read()
     end = tail.rfind(b"PK\5\6")
     if end < 0 or len(tail) < end + 22:
         raise ValueError("it is not a Filoplume project, or its end is missing")
-    (length,) = struct.unpack_from("<I", tail, end + 12)
+    count, length = struct.unpack_from("<HI", tail, end + 10)
     if end >= 76 and tail[end - 20 : end - 16] == b"PK\6\7":
-        (length,) = struct.unpack_from("<Q", tail, end - 76 + 40)
+        count, length = struct.unpack_from("<QQ", tail, end - 76 + 32)
     if length > 256 * (MOST_ARRAYS + 1):
         raise ValueError("it holds too many members")
+    return int(count)
 
 
 def _read_tree(archive: zipfile.ZipFile) -> Envelope:
@@ -231,7 +237,9 @@ def _read_array(archive: zipfile.ZipFile, digest: str, spec: ArraySpec) -> np.nd
     return array_from(data, spec)
 
 
-def _sentence(name: str, error: Exception) -> str:
+def _sentence(path: str | os.PathLike[str], error: Exception) -> str:
+    name = Path(path).name
     if isinstance(error, OSError):
         return f"{name} cannot be opened: {error.strerror or error}."
-    return f"{name} cannot be opened: {str(error) or type(error).__name__}. The version before may be in {name}1."
+    before = f" The version before it is kept as {name}1." if os.path.exists(os.fspath(path) + "1") else ""
+    return f"{name} cannot be opened: {str(error) or type(error).__name__}.{before}"

@@ -17,7 +17,7 @@ from core.formats.arrays import ArraySpec, array_from
 from core.formats.journal import COMMIT, DELTA, DELTA_HEADER, HEADER, HEADER_SIZE, LOCK, MAGIC, OBJECT, SUFFIXES
 from core.formats.tree import LARGEST_TREE, decode_envelope, decode_part
 
-MOST_TRIED = 1000  # commits looked at before a journal is given up
+MOST_TRIED = 1000  # intact commits looked at before a file is given up
 LARGEST_JOURNAL = 16 << 30
 _CHAIN_LIMIT = 256
 
@@ -95,10 +95,15 @@ def recover_files(paths: Iterable[Path], token: str = "") -> Recovered | None:
     arrays = _Arrays(piece for file in pieces for piece in file)
     best: Recovered | None = None
     for file in pieces:
-        commits = [piece for piece in file if piece.kind == COMMIT and piece.length <= LARGEST_TREE]
-        for piece in commits[: -MOST_TRIED - 1 : -1]:
+        tried = 0
+        for piece in reversed(file):
+            if piece.kind != COMMIT or piece.length > LARGEST_TREE or (payload := piece.payload()) is None:
+                continue
+            tried += 1
+            if tried > MOST_TRIED:
+                break
             try:
-                state = _state(piece, arrays, token, 0 if best is None else best.sequence)
+                state = _state(payload, arrays, token, 0 if best is None else best.sequence)
             except Exception:  # whatever a damaged file provokes, an older state may do
                 continue
             if state is not None:
@@ -152,13 +157,12 @@ def _scan(data: bytes) -> Iterator[_Piece]:
         at += 1
 
 
-def _state(piece: _Piece, arrays: _Arrays, token: str, newer_than: int) -> Recovered | None:
+def _state(payload: bytes, arrays: _Arrays, token: str, newer_than: int) -> Recovered | None:
     """The state of a commit; None when it is not newer. Raises when anything about it is not whole."""
-    payload = piece.payload()
-    if payload is None:
-        raise ValueError("a damaged commit")
     envelope = decode_envelope(payload)
     about = msgspec.convert(envelope.raw.get("journal"), _About)
+    if about.sequence < 1:
+        raise ValueError("a commit without a number")
     if about.sequence <= newer_than:
         return None
     found = {digest: arrays.get(digest, spec) for digest, spec in envelope.table.items()}

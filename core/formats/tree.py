@@ -72,7 +72,10 @@ def decode_envelope(data: bytes) -> Envelope:
         raise ValueError("its description is not a JSON object")
     _check_limits(raw)
     raw = upgrade(raw)
-    table = msgspec.convert(raw.get("arrays"), dict[str, ArraySpec])
+    try:
+        table = msgspec.convert(raw.get("arrays"), dict[str, ArraySpec])
+    except msgspec.ValidationError as error:
+        raise ValueError(f"arrays: {error}") from None
     if len(table) > MOST_ARRAYS:
         raise ValueError(f"it has more than {MOST_ARRAYS} arrays")
     return Envelope(raw, table)

@@ -127,6 +127,9 @@ def test_the_file_before_is_kept(tmp_path):
     write_project(path, second)
     assert same_bits(read_project(path).document, second)
     assert same_bits(read_project(tmp_path / "a.filo1").document, first)
+    path.write_bytes(b"")
+    with pytest.raises(UserError, match="The version before it is kept as a.filo1"):
+        read_project(path)
 
 
 def test_remembered_hashes_are_the_right_ones(tmp_path):
