@@ -23,6 +23,7 @@ F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 F64_1D = types.Array(types.float64, 1, "C", readonly=True)
 NO_FIELD = DistanceField(freeze(np.zeros(3)), 1.0, 0.0, freeze(np.zeros((0, 0, 0), np.float32)))
 REPEATS = 4
+ESCAPES = 5
 LEAST_GRADIENT = 0.3  # a distance grows by 1 per metre; less is the flat rest beyond the band, or a ridge
 
 
@@ -55,7 +56,8 @@ def collide_chain(x, q, lengths, first, values, origin, cell, clearance, move): 
         pieces = min(8, max(2, int(length / cell) + 1))
         at_end = 0.0
         here = np.inf
-        for repeat in range(REPEATS + 1):
+        ex = ey = ez = 0.0
+        for repeat in range(REPEATS + ESCAPES + 1):
             here = np.inf
             worst, worst_t = 0.0, 1.0
             for piece in range(pieces, 0, -1):
@@ -73,8 +75,26 @@ def collide_chain(x, q, lengths, first, values, origin, cell, clearance, move): 
                     at_end = d
                     if before + d > length + 2.0 * clearance:
                         break
-            if worst <= 1e-6 * length or repeat == REPEATS or not move:
+            if worst <= 1e-6 * length or repeat == REPEATS + ESCAPES or not move:
                 break
+            if repeat >= REPEATS:
+                # Sharp or thin skin, whose normals fight each other: away from what is nearest to the joint before.
+                if here >= 0.0:
+                    break
+                if repeat == REPEATS:
+                    _, ex, ey, ez = sample_gradient(values, origin, cell, x[j, 0], x[j, 1], x[j, 2])
+                    size = math.sqrt(ex * ex + ey * ey + ez * ez)
+                    if size < LEAST_GRADIENT:
+                        break
+                    ex, ey, ez = ex / size, ey / size, ez / size
+                push = 0.5 * 2.0 ** (repeat - REPEATS)
+                q[j, 0], q[j, 1], q[j, 2] = q[j, 0] + push * ex, q[j, 1] + push * ey, q[j, 2] + push * ez
+                size = math.sqrt(q[j, 0] * q[j, 0] + q[j, 1] * q[j, 1] + q[j, 2] * q[j, 2])
+                if size < 1e-6:
+                    q[j, 0], q[j, 1], q[j, 2] = ex, ey, ez
+                else:
+                    q[j, 0], q[j, 1], q[j, 2] = q[j, 0] / size, q[j, 1] / size, q[j, 2] / size
+                continue
             step = worst_t * length
             _, nx, ny, nz = sample_gradient(
                 values, origin, cell,
@@ -82,7 +102,7 @@ def collide_chain(x, q, lengths, first, values, origin, cell, clearance, move): 
             )
             size = math.sqrt(nx * nx + ny * ny + nz * nz)
             if size < LEAST_GRADIENT:
-                break
+                continue
             nx, ny, nz = nx / size, ny / size, nz / size
             rise = q[j, 0] * nx + q[j, 1] * ny + q[j, 2] * nz
             tx, ty, tz = q[j, 0] - rise * nx, q[j, 1] - rise * ny, q[j, 2] - rise * nz
