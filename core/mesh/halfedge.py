@@ -257,7 +257,7 @@ def manifold(points: NDArray[np.float64], triangles: NDArray[np.int32], fill: fl
     triangles : (T, 3) int32.
     fill : loops of open edges up to this long are holes to be bridged.
     """
-    finite = np.isfinite(points).all(axis=1)
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(axis=1))
     tri = np.ascontiguousarray(weld(np.where(finite[:, None], points, 0.0))[triangles], np.int32)
     count = len(tri)
     live = (

@@ -155,7 +155,7 @@ class SurfaceSites:
         self._remove_mesh(skin, home)
         self._net.changed[:] = 0
         self._net.tally[TOUCHED] = 0
-        self._nearest_site = None
+        self._nearest_site: cKDTree | None = None
         self._relabel()
 
     def _allocate(self, skin: Manifold, count: int) -> None:
@@ -341,7 +341,7 @@ class SurfaceSites:
             sites[lost] = self._nearest(lost)[:, None]
         return Binding(sites, weights, order, int((trouble == 1).sum()), len(lost))
 
-    def _nearest(self, rows: NDArray[np.intp]) -> NDArray[np.int32]:
+    def _nearest(self, rows: NDArray) -> NDArray[np.int32]:
         """The site nearest in space to each of the given tracked points."""
 
         def place(triangle: NDArray[np.int32], bary: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ After Sharp, Soliman & Crane, Navigating Intrinsic Triangulations, SIGGRAPH 2019
 from __future__ import annotations
 
 from math import hypot, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -21,7 +21,7 @@ class Net(NamedTuple):
     origin, twin : (3 F,) int32; half-edge 3 f + k leaves corner k of face f; origin is -1 in unused faces.
     length : (3 F,) float64.
     first : (V,) int32, one half-edge leaving each vertex, -1 when it is not in the triangulation.
-    head, follow, home : first point of each face (F,), the point after each point (N,), the face of each (N,); -1: none.
+    head, follow, home : first point of each face (F,), point after each point (N,), its face (N,); -1: none.
     bary : (N, 3) float64, weights of the corners of the home face.
     queued, stack : (3 F,) half-edges waiting for the Delaunay test.
     changed, touched : (F,) faces changed since they were last gathered, as flags and as a list.
@@ -50,7 +50,9 @@ F1 = types.Array(types.float64, 1, "C")
 F2 = types.Array(types.float64, 2, "C")
 B1 = types.Array(types.uint8, 1, "C")
 L1 = types.Array(types.int64, 1, "C")
-NET = types.NamedTuple((I1, I1, F1, I1, I1, I1, I1, F2, B1, I1, B1, I1, I1, L1), Net)
+NET: Any = types.NamedTuple(  # type: ignore[no-untyped-call]
+    (I1, I1, F1, I1, I1, I1, I1, F2, B1, I1, B1, I1, I1, L1), Net
+)
 
 FREE, TOUCHED, WAITING, FLIPS = 0, 1, 2, 3
 CLAMP = 1e-4  # a new vertex keeps this share of its triangle from every edge

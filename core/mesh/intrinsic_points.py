@@ -232,7 +232,7 @@ def find_place(net, base, corners, weights, out):  # type: ignore[no-untyped-def
         double = max(ux * vy - uy * vx, 1e-300)
         b = ((x - ax) * vy - (y - ay) * vx) / double
         c = (ux * (y - ay) - uy * (x - ax)) / double
-        low = min(min(b, c), 1.0 - b - c)
+        low = min(b, c, 1.0 - b - c)
         if low > least:
             best, least = j, low
             out[0], out[1], out[2] = 1.0 - b - c, b, c

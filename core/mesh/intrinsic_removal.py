@@ -10,7 +10,7 @@ cannot be made flat the angles are shared out evenly: no longer conformal, still
 from __future__ import annotations
 
 from math import atan2, cos, exp, hypot, pi, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -58,16 +58,16 @@ class Ring(NamedTuple):
     affine: np.ndarray
 
 
-RING = types.NamedTuple((I1,) * 6 + (F1,) * 6 + (types.Array(types.int32, 2, "C"), F2), Ring)
+RING: Any = types.NamedTuple(  # type: ignore[no-untyped-call]
+    (I1,) * 6 + (F1,) * 6 + (types.Array(types.int32, 2, "C"), F2), Ring
+)
 
 
 def make_ring() -> Ring:
     """Working room for :func:`remove_vertex`."""
     n = LARGEST_RING
-    return Ring(
-        *(np.empty(n, np.int32) for _ in range(6)), *(np.empty(n) for _ in range(6)),
-        np.empty((n, 3), np.int32), np.empty((n, 6)),
-    )
+    whole, real = [np.empty(n, np.int32) for _ in range(6)], [np.empty(n) for _ in range(6)]
+    return Ring._make([*whole, *real, np.empty((n, 3), np.int32), np.empty((n, 6))])
 
 
 @njit(types.int64(NET, RING, types.int64, types.int64), cache=True, nogil=True)
@@ -285,7 +285,7 @@ def _relocate(net, ring, p, d, x, y):  # type: ignore[no-untyped-def]
     for n in range(d - 2):
         b = ring.affine[n, 0] + ring.affine[n, 1] * x + ring.affine[n, 2] * y
         c = ring.affine[n, 3] + ring.affine[n, 4] * x + ring.affine[n, 5] * y
-        low = min(min(b, c), 1.0 - b - c)
+        low = min(b, c, 1.0 - b - c)
         if low > least:
             least = low
             best, w0, w1 = n, b, c
