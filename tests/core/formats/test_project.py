@@ -128,7 +128,7 @@ def test_the_file_before_is_kept(tmp_path):
     assert same_bits(read_project(path).document, second)
     assert same_bits(read_project(tmp_path / "a.filo1").document, first)
     path.write_bytes(b"")
-    with pytest.raises(UserError, match="The version before it is kept as a.filo1"):
+    with pytest.raises(UserError, match=r"The version before it is kept as a\.filo1"):
         read_project(path)
 
 
