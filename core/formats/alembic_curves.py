@@ -23,12 +23,16 @@ def read_in_child(path: str) -> dict[str, Any]:
     for Hermite, power and variable-order curves the control points are kept, with a note. Curves whose
     ``groom_guide`` is not 0 are guides (it may differ from curve to curve), all others children.
     """
+    try:
+        return _read_archive(path)
+    except RuntimeError as error:  # what the library makes of the exceptions of Alembic
+        raise UserError(f"{Path(path).name} is damaged, or not an Alembic file.") from error
+
+
+def _read_archive(path: str) -> dict[str, Any]:
     from alembic3d import Abc
 
-    try:
-        archive = Abc.IArchive(path)
-    except Exception as error:  # its exceptions are of the C++ runtime
-        raise UserError(f"{Path(path).name} is not a readable Alembic file.") from error
+    archive = Abc.IArchive(path)
     bundles: list[RawCurves] = []
     notes: list[str] = []
     said: dict[str, Any] = {}

@@ -164,14 +164,18 @@ def read_in_child(path: str) -> dict[str, Any]:
     the primvar ``groom_guide`` at 1 or of purpose ``guide`` are guides, all others children. "metres_per_unit"
     and "up" are None where the file does not say.
     """
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Tf
 
     try:
-        stage = Usd.Stage.Open(path)
+        return _read_stage(path)
     except Tf.ErrorException as error:
-        raise UserError(f"{Path(path).name} is not a readable USD file.") from error
-    if stage is None:
-        raise UserError(f"{Path(path).name} is not a readable USD file.")
+        raise UserError(f"{Path(path).name} is damaged, or not a USD file.") from error
+
+
+def _read_stage(path: str) -> dict[str, Any]:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(path)
     time = Usd.TimeCode.EarliestTime()
     transforms = UsdGeom.XformCache(time)
     bundles: list[RawCurves] = []

@@ -134,5 +134,5 @@ def test_damaged_archives_are_refused_in_one_sentence(tmp_path, damage):
     whole = path.read_bytes()
     damaged = {"noise": whole[:200] + bytes(len(whole) - 200), "cut": whole[: len(whole) // 2], "empty": b""}
     path.write_bytes(damaged[damage])
-    with pytest.raises(UserError):
+    with pytest.raises(UserError, match=r"^coat\.abc is damaged"):
         read_groom(path)

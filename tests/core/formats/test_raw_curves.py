@@ -112,15 +112,16 @@ def test_values_of_every_scope_reach_the_points_or_are_left_out():
 
 
 def test_short_and_unfinite_curves_are_left_out_with_their_rows():
-    points = np.arange(27, dtype=np.float32).reshape(9, 3)
+    points = np.arange(30, dtype=np.float32).reshape(10, 3)
     points[3, 1] = np.nan
-    uvs = np.array([[0, 0], [1, 1], [2, np.inf], [3, 3]], np.float32)
-    raw = RawCurves(counts=np.array([3, 2, 2, 2]), points=points, ids=np.arange(4, dtype=np.int32), root_uvs=uvs)
+    uvs = np.array([[0, 0], [1, 1], [2, np.inf], [3, 3], [4, 4], [5, 5]], np.float32)
+    ids = np.arange(6, dtype=np.int32)
+    raw = RawCurves(counts=np.array([3, 2, 2, 2, 0, 1]), points=points, ids=ids, root_uvs=uvs)
     kept = clean(raw, "it")
     assert kept.counts.tolist() == [3, 2]
     assert kept.ids.tolist() == [0, 3]
     np.testing.assert_array_equal(kept.points, points[[0, 1, 2, 7, 8]])
-    assert "2 curves" in kept.notes[0]
+    assert "4 curves" in kept.notes[0]
 
 
 def test_merge_drops_columns_only_some_have_and_says_so():

@@ -197,7 +197,7 @@ def test_counts_that_do_not_fit_are_refused_in_one_sentence(tmp_path):
     with pytest.raises(UserError, match="holds no curves"):
         read_groom(path)
     (tmp_path / "noise.usdc").write_bytes(b"PXR-USDC" + bytes(range(200)))
-    with pytest.raises(UserError):
+    with pytest.raises(UserError, match=r"^noise\.usdc is damaged"):
         read_groom(tmp_path / "noise.usdc")
 
 
