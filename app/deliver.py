@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from core.camera import Camera, frame_points
+import numpy as np
+
+from core.camera import frame_points
 from core.document import Document, find_mesh
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.formats import curve_file, mesh_file
+from core.formats import curve_file
 from core.formats.project import write_project
 from core.groom.children import Children
 from core.groom.export import groom_strands
-from core.mesh.skin import skin_at_rest
+from core.groom.strands import GroomStrands
+from core.mesh.skin import Skin, skin_at_rest, skin_posed
+from core.pose.skinning import posed_points
+
+if TYPE_CHECKING:
+    from viewport.scene import Scene
 
 VIEWS = {
     "three-quarter": (-0.85, -0.35, -1.0), "front": (0.0, -0.08, -1.0), "back": (0.0, -0.08, 1.0),
@@ -48,31 +56,40 @@ def deliver(path: Path, document: Document, children: Mapping[int, Children]) ->
     curve_file.write_groom(path, groom_strands(groom, mesh, children[groom.id]), mesh)
 
 
-def write_mesh_of(path: Path, document: Document) -> None:
-    """Write the meshes of a document, the first one, to a mesh file."""
-    if not document.meshes:
-        raise UserError("this document has no mesh")
-    mesh_file.write_mesh(path, document.meshes[0].mesh)
+def posed_document(document: Document, frame: float | None, evaluator: Evaluator) -> dict[int, Skin]:
+    """The skin of every mesh (by id) at a frame of its clip; at rest without a frame or without a rig."""
+    skins = {}
+    for item in document.meshes:
+        if frame is None or item.rig is None:
+            skins[item.id] = skin_at_rest(item.mesh, evaluator)
+        else:
+            points = posed_points(item.mesh.points, item.rig, frame, evaluator.workers.ranges)
+            skins[item.id] = skin_posed(item.mesh, points, evaluator)
+    return skins
 
 
 def draw(
     path: Path, document: Document, children: Mapping[int, Children], evaluator: Evaluator,
-    size: tuple[int, int] = (1600, 1000), view: str = "three-quarter", camera: Camera | None = None,
+    size: tuple[int, int] = (1600, 1000), view: str = "three-quarter", skins: Mapping[int, Skin] | None = None,
 ) -> None:
-    """Draw the document's meshes and coats into a PNG."""
+    """Draw the document's meshes and coats into a PNG, at rest or in the pose of `skins`."""
     from viewport.document_scene import scene_of  # GL is loaded only when a picture is asked for
+
+    shown = posed_document(document, None, evaluator) if skins is None else skins
+    _picture(path, scene_of(document, shown, children), size, view)
+
+
+def draw_strands(path: Path, groom: GroomStrands, size: tuple[int, int], view: str) -> None:
+    """Draw a groom file that came without its animal."""
+    from viewport.document_scene import scene_of_strands
+
+    _picture(path, scene_of_strands(groom), size, view)
+
+
+def _picture(path: Path, scene: Scene, size: tuple[int, int], view: str) -> None:
     from viewport.picture import render_png
+    from viewport.scene import all_points
 
-    skins = {item.id: skin_at_rest(item.mesh, evaluator) for item in document.meshes}
-    scene = scene_of(document, skins, children)
-    if camera is None:
-        camera = frame_points(_bounds(document, children), VIEWS[view], size[0] / size[1])
-    render_png(path, scene, camera, size)
-
-
-def _bounds(document: Document, children: Mapping[int, Children]):  # type: ignore[no-untyped-def]
-    import numpy as np
-
-    clouds = [item.mesh.points for item in document.meshes]
-    clouds += [np.ascontiguousarray(c.points[:, :, -1]) for c in children.values() if len(c)]
-    return np.concatenate(clouds) if clouds else np.zeros((1, 3), np.float32)
+    clouds = [points for points in all_points(scene) if len(points)]
+    points = np.concatenate(clouds) if clouds else np.zeros((1, 3), np.float32)
+    render_png(path, scene, frame_points(points, VIEWS[view], size[0] / size[1]), size)

@@ -29,7 +29,7 @@ def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[in
         if not item.hidden
     )
     hair = tuple(
-        Coat(children[g.id].points, children[g.id].ids, children[g.id].normals, look_of(g.coat))
+        Coat(children[g.id].points, children[g.id].ids, children[g.id].roots()[1], look_of(g.coat))
         for g in document.grooms
         if g.id in children and len(children[g.id])
     )

@@ -1,0 +1,121 @@
+"""From a groom to its hairs: scatter, bind, evaluate, settle. The static part is remembered, the rest is per frame."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import UserError
+from core.evaluator import Evaluator
+from core.groom.children import Children, Shape, evaluate, update_roots
+from core.groom.dress import Stage, no_stages
+from core.groom.groom import Groom
+from core.groom.maps import density_at, sample_map
+from core.groom.resample import with_point_count
+from core.groom.settle import count_inside_segments, settle
+from core.mesh.bvh import closest_points
+from core.mesh.distance_field import build_distance_field
+from core.mesh.edges import is_closed
+from core.mesh.intrinsic import bind
+from core.mesh.mesh import Mesh
+from core.mesh.scatter import Scatter, scatter
+from core.mesh.signed_distance import build_signed_skin
+from core.mesh.skin import Skin, distance_field, root_places, skin_at_rest
+from core.mesh.surface import root_normals, strands_on_deformed
+from core.random import rand
+from core.value import evaluate as evaluate_value
+from core.value import names_used
+
+INSIDE_TOLERANCE = 1e-5  # of the bounding-box diagonal: what float32 roots may lie under the skin
+
+
+def grow(
+    groom: Groom, mesh: Mesh, evaluator: Evaluator, skin: Skin | None = None, frame: float = 1001.0,
+    stage: Stage = no_stages,
+) -> Children:
+    """The hairs of a groom, evaluated.
+
+    Parameters
+    ----------
+    mesh : the mesh the groom grows on, at rest; roots are scattered and bound there.
+    skin : the mesh in the pose wanted; at rest when None. Guides and hairs turn with it.
+    frame : what animated values of the coat are taken at.
+    """
+    rest = skin_at_rest(mesh, evaluator)
+    skin = rest if skin is None else skin
+    coat, workers = groom.coat, evaluator.workers
+    guides = groom.guides
+    if guides.points.shape[1] != coat.points:
+        guides = with_point_count(guides, coat.points)
+    with stage("scatter"):
+        density = density_at(groom.maps, coat.density_map, mesh, rest.triangles)
+        places = scatter(
+            rest.points, rest.triangles.vertices, coat.count, seed=coat.seed, density=density, workers=workers
+        )
+    with stage("bind"):
+        children = _bound(groom, mesh, rest, places)
+    with stage("evaluate"):
+        factors = length_factors(groom, mesh, rest, places, frame)
+        children.set_length(factors)
+        posed = skin is not rest
+        points = strands_on_deformed(mesh, guides.roots, guides.points, skin.points) if posed else guides.points
+        normals = root_normals(mesh, guides.roots, skin.points if posed else None)
+        update_roots(children, skin.points, skin.normals)
+        evaluate(children, points, normals, workers, shape=Shape(coat.clump, coat.frizz, coat.seed))
+    with stage("settle"):
+        field = build_distance_field(skin.points, skin.triangles.vertices) if posed else distance_field(mesh, evaluator)
+        settle(children.points, field, workers=workers)
+    return children
+
+
+def length_factors(groom: Groom, mesh: Mesh, rest: Skin, places: Scatter, frame: float) -> NDArray[np.float32]:
+    """Factors (N,) float32 in rank order: the coat's length, its map, and the variation keyed on the id."""
+    coat = groom.coat
+    ids = np.arange(len(places.triangle))
+    fields = {"id": ids, **{
+        item.name: sample_map(item, mesh, rest.triangles, places.triangle, places.barycentric)
+        for item in groom.maps
+        if item.name in names_used(coat.length) or item.name == coat.length_map
+    }}
+    factor = evaluate_value(coat.length, frame, fields) * (1.0 - coat.length_variation * rand(ids, coat.seed + 101))
+    if coat.length_map is not None:
+        factor = factor * fields[coat.length_map]
+    return np.ascontiguousarray(np.broadcast_to(factor, ids.shape), np.float32)
+
+
+def _bound(groom: Groom, mesh: Mesh, rest: Skin, places: Scatter) -> Children:
+    if len(groom.guides) == 0:
+        raise UserError("this groom has no guides; plant some before hair can grow")
+    triangle, weights = root_places(rest, groom.guides.roots)
+    binding = bind(
+        rest.points, rest.triangles.vertices, triangle, weights, places.triangle, places.barycentric, groom.coat.seed
+    )
+    uvs = None if mesh.uvs is None else mesh.uvs[rest.triangles.corners]
+    return Children(
+        places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, groom.coat.points
+    )
+
+
+class Figures(NamedTuple):
+    """root_error_max : largest distance of a root from the skin over the bounding-box diagonal.
+    inside_segments : segments of hairs inside the skin, None where the skin is not closed."""
+
+    root_error_max: float
+    inside_segments: int | None
+
+
+def measure(groom: Groom, mesh: Mesh, children: Children, evaluator: Evaluator) -> Figures:
+    """How well hairs at rest stand on their skin."""
+    skin = skin_at_rest(mesh, evaluator)
+    signed = build_signed_skin(mesh.points, skin.triangles.vertices)
+    roots = np.ascontiguousarray(children.points[:, :, 0])
+    _, _, distance = closest_points(skin.bvh, roots, workers=evaluator.workers)
+    error = float(distance.max()) / skin.diagonal if len(roots) else 0.0
+    if not is_closed(mesh):
+        return Figures(error, None)
+    inside = count_inside_segments(
+        children.points, distance_field(mesh, evaluator), signed, INSIDE_TOLERANCE * skin.diagonal, evaluator.workers
+    )
+    return Figures(error, inside)
