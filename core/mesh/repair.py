@@ -155,7 +155,7 @@ def _distinct_corners(
 
 
 def _take_faces(polygons: Polygons, kept: NDArray[np.int64]) -> Polygons:
-    """The kept faces, with a corner that repeats its neighbour left out."""
+    """The kept faces, without corners that repeat their neighbour and without further rounds of the same ring."""
     counts, corners, uvs, parts = polygons.counts, polygons.corners, polygons.uvs, polygons.parts
     if len(kept) < len(counts):
         rows = np.zeros(len(counts), np.bool_)
@@ -167,9 +167,31 @@ def _take_faces(polygons: Polygons, kept: NDArray[np.int64]) -> Polygons:
     if again.any():
         counts = counts - np.bincount(np.repeat(np.arange(len(counts)), counts)[again], minlength=len(counts))
         corners, uvs = corners[~again], None if uvs is None else uvs[~again]
+    once = _first_rounds(counts, corners)
+    if once is not None:
+        rounds = np.add.reduceat(once, np.cumsum(counts) - counts, dtype=np.int64)
+        counts, corners, uvs = rounds, corners[once], None if uvs is None else uvs[once]
     # copies, because faces are turned in place later
     uvs = None if uvs is None else uvs.astype(np.float32)
     return polygons._replace(counts=counts, corners=corners.copy(), uvs=uvs, parts=parts)
+
+
+def _first_rounds(counts: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.bool_] | None:
+    """The corners of the first round of each face, (C,), where a face goes round itself several times; else None."""
+    starts = np.cumsum(counts) - counts
+    rows = np.flatnonzero(counts >= 6)
+    if not len(rows):
+        return None
+    distinct = _distinct_corners(counts, corners, np.repeat(np.arange(len(counts)), counts))
+    suspects = rows[(distinct[rows] < counts[rows]) & (counts[rows] % np.maximum(distinct[rows], 1) == 0)]
+    once = None
+    for row in suspects.tolist():
+        start, count, period = int(starts[row]), int(counts[row]), int(distinct[row])
+        rounds = corners[start : start + count].reshape(-1, period)
+        if (rounds == rounds[0]).all():
+            once = np.ones(len(corners), np.bool_) if once is None else once
+            once[start + period : start + count] = False
+    return once
 
 
 def _join_open_edges(

@@ -170,6 +170,13 @@ def test_a_repeated_neighbour_is_left_out_of_its_face():
     np.testing.assert_array_equal(found.mesh.uvs[:, 0], [0, 4, 6, 8])
 
 
+def test_a_face_that_goes_round_itself_does_so_once():
+    found = repair(polygons(CUBE_POINTS, [*CUBE[:4], CUBE[4] * 3, CUBE[5] * 40], np.arange(376).reshape(188, 2)))
+    assert found.closed
+    assert faces_of(found.mesh) == CUBE
+    np.testing.assert_array_equal(found.mesh.uvs[16:24], np.r_[32:40, 56:64].reshape(8, 2))
+
+
 def test_three_faces_on_an_edge_are_counted():
     points = [(0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)]
     found = repair(polygons(points, [[0, 1, 2], [1, 0, 3], [0, 1, 4]]))
