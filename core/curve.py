@@ -15,6 +15,7 @@ Tangent = Literal["step", "linear", "smooth", "free"]
 Extrapolation = Literal["hold", "linear", "cycle"]
 
 MAX_KEYS = 100_000
+CLOSEST = 1e-6  # frames between two keys
 
 
 class Key(Record):
@@ -36,9 +37,8 @@ class Key(Record):
     leave_handle: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        number(self, "frame", "value", least=-1e30, most=1e30)
-        if not all(abs(x) <= 1e30 for x in (*self.arrive_handle, *self.leave_handle)):  # NaN fails as well
-            raise ValueError("Key handles must be finite numbers within 1e30")
+        number(self, "frame", least=-1e9, most=1e9)
+        number(self, "value", "arrive_handle", "leave_handle", least=-1e30, most=1e30)
         if self.arrive_handle[0] > 0.0 or self.leave_handle[0] < 0.0:
             raise ValueError("Key handles must not point backwards in time")
 
@@ -54,8 +54,8 @@ class Curve(Record, tag="curve"):
         if not 1 <= len(self.keys) <= MAX_KEYS:
             raise ValueError(f"Curve needs 1 to {MAX_KEYS} keys")
         frames = [key.frame for key in self.keys]
-        if any(b <= a for a, b in itertools.pairwise(frames)):
-            raise ValueError("Curve keys must stand at increasing frames")
+        if any(b - a < CLOSEST for a, b in itertools.pairwise(frames)):
+            raise ValueError(f"Curve keys must stand at increasing frames, at least {CLOSEST:g} apart")
 
     @property
     def animated(self) -> bool:
@@ -111,14 +111,16 @@ def _parameter(x: Array, frames: Array) -> Array:
     s, low, high = target.copy(), np.zeros_like(target), np.ones_like(target)
     for _ in range(64):
         error = _bezier(p, s) - target
-        if not np.any(np.abs(error) > 1e-15):
+        moving = np.abs(error) > 1e-15
+        if not moving.any():
             break
         low, high = np.where(error < 0.0, s, low), np.where(error > 0.0, s, high)
         r = 1.0 - s
         slope = 3.0 * (r * r * p[..., 1] + 2.0 * s * r * (p[..., 2] - p[..., 1]) + s * s * (1.0 - p[..., 2]))
         with np.errstate(all="ignore"):
             step = s - error / slope
-        s = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        step = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        s = np.where(moving, step, s)  # one that has arrived stays, so that a value never depends on its neighbours
     return s
 
 
@@ -160,9 +162,8 @@ def smooth_slopes(frames: Array, values: Array) -> Array:
     out = np.zeros(len(frames))
     a, b = slope[:-1], slope[1:]
     w1, w2 = 2.0 * length[1:] + length[:-1], length[1:] + 2.0 * length[:-1]
-    same = np.sign(a) * np.sign(b) > 0.0
-    safe_a, safe_b = np.where(same, a, 1.0), np.where(same, b, 1.0)
-    out[1:-1] = np.where(same, (w1 + w2) / (w1 / safe_a + w2 / safe_b), 0.0)
+    same = a * b > 1e-200  # of one sign; what is smaller is flat
+    out[1:-1] = np.where(same, (w1 + w2) * a * b / np.where(same, w1 * b + w2 * a, 1.0), 0.0)
     return out
 
 
