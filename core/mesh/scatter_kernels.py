@@ -20,7 +20,9 @@ U32_1D = types.Array(types.uint32, 1, "C", readonly=True)
 SHRINK = 0.93  # of the radius from level to level: 16 % more roots each
 FIRST_RADIUS = 0.5  # of the root of the area
 MAX_LEVELS = 300  # 0.93^300 is beyond what float32 places can tell apart
-REBUILD_LEVELS = 4
+REBUILD_LEVELS = 2
+ENOUGH = 0.75  # of the radius: nearer than this the search for the very nearest root ends
+BUCKETS_PER_ROOT = 2
 OCTAVES = 5  # of the stretch: 1, 2, 4, 8, 16
 SAME_SIDE = 0.2  # least cosine between the normals of two roots that keep their distance
 
@@ -33,7 +35,7 @@ def _weights(key, seed):  # type: ignore[no-untyped-def]
     return 1.0 - root, root * (1.0 - v), root * v
 
 
-@njit(types.void(U32_1D, types.int64, types.float32[:, ::1]), cache=True, nogil=True)
+@njit(types.void(U32_1D, types.int64, types.float32[:, ::1]), cache=True, nogil=True, error_model="numpy")
 def interpolate(keys, seed, barycentric):  # type: ignore[no-untyped-def]
     """Write the barycentric weights of candidates `keys`."""
     for i in range(len(keys)):
@@ -45,7 +47,7 @@ def interpolate(keys, seed, barycentric):  # type: ignore[no-untyped-def]
     types.void(
         F64_1D, F32_2D, I64_1D, types.int64, types.int32[::1], types.float32[:, ::1], types.int64, types.int64
     ),
-    cache=True, nogil=True,
+    cache=True, nogil=True, error_model="numpy",
 )
 def draw_candidates(cumulative, corners, ends, seed, triangle, places, start, stop):  # type: ignore[no-untyped-def]
     """Candidates start .. stop: the i-th of a batch of m lies at (i + random) / m of the cumulative area."""
@@ -76,7 +78,7 @@ def shuffle_key(chosen: NDArray[np.int64], levels: NDArray[np.int64], seed: int)
     return keys
 
 
-@njit(types.void(I64_1D, I64_1D, types.int64, types.uint64[::1]), cache=True, nogil=True)
+@njit(types.void(I64_1D, I64_1D, types.int64, types.uint64[::1]), cache=True, nogil=True, error_model="numpy")
 def _shuffle_key(chosen, levels, seed, keys):  # type: ignore[no-untyped-def]
     for i in range(len(chosen)):
         number = np.uint64(rand1(np.uint32(chosen[i]), np.uint32(seed + 5)) * 4294967296.0)
@@ -85,61 +87,105 @@ def _shuffle_key(chosen, levels, seed, keys):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _bucket(octave, i, j, k, mask):  # type: ignore[no-untyped-def]
-    """Bucket of a cell (Teschner et al., "Optimized Spatial Hashing", 2003)."""
-    return ((i * 73856093) ^ (j * 19349663) ^ (k * 83492791) ^ (octave * 1640531513)) & mask
+    """Bucket of a cell: blocks of 4 x 4 x 4 cells are hashed, so that neighbours share lines of the cache."""
+    block = ((i >> 2) * 73856093) ^ ((j >> 2) * 19349663) ^ ((k >> 2) * 83492791) ^ (octave * 1640531513)
+    return ((block & mask) << 6) | ((i & 3) << 4) | ((j & 3) << 2) | (k & 3)
 
 
 @njit(cache=True, inline="always")
-def _insert(heads, links, roots, octaves, row, cell, mask):  # type: ignore[no-untyped-def]
-    octave = octaves[row]
+def _octave(stretch):  # type: ignore[no-untyped-def]
+    octave = 0
+    while octave < OCTAVES - 1 and stretch > (1 << octave):
+        octave += 1
+    return octave
+
+
+@njit(cache=True, inline="always")
+def _bucket_of(x, y, z, octave, cell, mask):  # type: ignore[no-untyped-def]
     scale = 1.0 / (cell * (1 << octave))
-    b = _bucket(
-        octave,
-        math.floor(roots[row, 0] * scale), math.floor(roots[row, 1] * scale),
-        math.floor(roots[row, 2] * scale), mask,
-    )
-    links[row] = heads[b]
-    heads[b] = row
+    return _bucket(octave, math.floor(x * scale), math.floor(y * scale), math.floor(z * scale), mask)
 
 
-@njit(cache=True)
-def _nearest(heads, links, roots, counts, cell, mask, radius, x, y, z, stretch, nx, ny, nz):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rebuild(old, grid, accepted, cell, mask, heads):  # type: ignore[no-untyped-def]
+    """Move all roots to cells of a new size, in memory bucket after bucket."""
+    starts = np.zeros(64 * (mask + 1) + 1, np.int32)
+    buckets = np.empty(accepted, np.int32)
+    for row in range(accepted):
+        b = _bucket_of(
+            np.float64(old[row, 0]), np.float64(old[row, 1]), np.float64(old[row, 2]), _octave(old[row, 5]), cell, mask
+        )
+        buckets[row] = b
+        starts[b + 1] += 1
+    for b in range(64 * (mask + 1)):
+        starts[b + 1] += starts[b]
+        heads[b] = -1
+    links = grid.view(np.int32)
+    for row in range(accepted):
+        b = buckets[row]
+        at = starts[b]
+        starts[b] += 1
+        for k in range(6):
+            grid[at, k] = old[row, k]
+        links[at, 3] = heads[b]
+        heads[b] = at
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _nearest(heads, grid, normals, counts, cell, mask, radius, x, y, z, own, t):  # type: ignore[no-untyped-def]
     """Smallest distance over stretch to a root on the same side of the skin, if below `radius` (else infinite).
 
-    Two roots of different stretch keep the distance of the smaller one, so that a ball never leaves 8 cells.
+    When one is clearly near it is returned without looking for a nearer one. Two roots of different stretch keep the
+    distance of the smaller one, so that a ball never leaves 8 cells.
     """
-    best = radius
-    found = False
+    best = np.inf
+    limit = radius * own
+    limit2 = limit * limit
+    links = grid.view(np.int32)
     for octave in range(OCTAVES):
         if counts[octave] == 0:
             continue
-        reach = radius * min(stretch, np.float64(1 << octave))
+        reach = radius * min(own, np.float64(1 << octave))
         scale = 1.0 / (cell * (1 << octave))
-        i0, i1 = math.floor((x - reach) * scale), math.floor((x + reach) * scale)
-        j0, j1 = math.floor((y - reach) * scale), math.floor((y + reach) * scale)
-        k0, k1 = math.floor((z - reach) * scale), math.floor((z + reach) * scale)
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
-                for k in range(k0, k1 + 1):
-                    row = heads[_bucket(octave, i, j, k, mask)]
-                    while row >= 0:
-                        dx, dy, dz = roots[row, 0] - x, roots[row, 1] - y, roots[row, 2] - z
-                        limit = best * min(stretch, roots[row, 6])
-                        d2 = dx * dx + dy * dy + dz * dz
-                        if d2 < limit * limit and (
-                            nx * roots[row, 3] + ny * roots[row, 4] + nz * roots[row, 5] > SAME_SIDE
-                        ):
-                            best = math.sqrt(d2) / min(stretch, roots[row, 6])
-                            found = True
-                        row = links[row]
-    return best if found else np.inf
+        fx, fy, fz = x * scale, y * scale, z * scale
+        i0, j0, k0 = math.floor(fx), math.floor(fy), math.floor(fz)
+        fx, fy, fz = fx - i0, fy - j0, fz - k0
+        # the ball reaches over one side of its own cell at most on every axis
+        edge = reach * scale
+        di = -1 if fx < edge else (1 if fx > 1.0 - edge else 0)
+        dj = -1 if fy < edge else (1 if fy > 1.0 - edge else 0)
+        dk = -1 if fz < edge else (1 if fz > 1.0 - edge else 0)
+        for corner in range(8):
+            if (corner & 1 and di == 0) or (corner & 2 and dj == 0) or (corner & 4 and dk == 0):
+                continue
+            i, j, k = i0 + di * (corner & 1), j0 + dj * (corner >> 1 & 1), k0 + dk * (corner >> 2)
+            row = heads[_bucket(octave, i, j, k, mask)]
+            while row >= 0:
+                dx, dy, dz = grid[row, 0] - x, grid[row, 1] - y, grid[row, 2] - z
+                d2 = dx * dx + dy * dy + dz * dz
+                if d2 < limit2:
+                    u = links[row, 4]
+                    facing = np.float32(1.0)
+                    if u != t:
+                        facing = (
+                            normals[u, 0] * normals[t, 0] + normals[u, 1] * normals[t, 1]
+                            + normals[u, 2] * normals[t, 2]
+                        )
+                    distance = math.sqrt(d2) / min(own, np.float64(grid[row, 5]))
+                    if facing > SAME_SIDE and distance < min(best, radius):
+                        best = distance
+                        limit2 = (best * own) ** 2
+                row = links[row, 3]
+            if best < ENOUGH * radius:
+                return best  # it sleeps long anyway; waking a little early does no harm
+    return best
 
 
 @njit(
     types.Tuple((types.int64[::1], types.int64[::1], types.boolean))(  # type: ignore[no-untyped-call]
         I32_1D, F32_2D, F32_1D, F32_2D, I64_1D, types.float64, types.float64, types.int64
     ),
-    cache=True, nogil=True,
+    cache=True, nogil=True, error_model="numpy",
 )
 def even_subset(triangle, places, stretch, normals, ends, size, per_root, count):  # type: ignore[no-untyped-def]
     """Choose at least `count` candidates, level by level; the last level is finished.
@@ -150,15 +196,12 @@ def even_subset(triangle, places, stretch, normals, ends, size, per_root, count)
     room = min(total, int(1.3 * count) + 1024)
     chosen = np.empty(room, np.int64)
     levels = np.empty(room, np.int64)
-    roots = np.empty((room, 8), np.float32)
-    octaves = np.empty(room, np.int64)
-    links = np.empty(room, np.int32)
+    # of each root its place, then as bits of int32 the next root of its bucket and its triangle, then its stretch
+    grid = np.empty((room, 6), np.float32)
+    spare = np.empty((room, 6), np.float32)
     counts = np.zeros(OCTAVES, np.int64)
-    buckets = 64
-    while buckets < room:
-        buckets *= 2
-    heads = np.empty(buckets, np.int32)
-    mask = 63
+    heads = np.full(64, -1, np.int32)
+    mask = 0
     sleepers = np.full(MAX_LEVELS + 1, -1, np.int32)  # first candidate to wake at each level
     next_sleeper = np.empty(total, np.int32)
     accepted, seen, batch = 0, 0, 0
@@ -170,11 +213,12 @@ def even_subset(triangle, places, stretch, normals, ends, size, per_root, count)
         radius = FIRST_RADIUS * size * SHRINK**level
         if level % REBUILD_LEVELS == 0:
             cell = 2.0 * radius
-            while mask + 1 < buckets and mask < 2 * accepted:
+            while BUCKETS_PER_ROOT * accepted > 64 * (mask + 1):
                 mask = 2 * mask + 1
-            heads[: mask + 1] = -1
-            for row in range(accepted):
-                _insert(heads, links, roots, octaves, row, cell, mask)
+            if len(heads) < 64 * (mask + 1):
+                heads = np.empty(64 * (mask + 1), np.int32)
+            grid, spare = spare, grid
+            _rebuild(spare, grid, accepted, cell, mask, heads)
         candidate = sleepers[level]
         first, last = 0, 0
         while True:
@@ -198,33 +242,28 @@ def even_subset(triangle, places, stretch, normals, ends, size, per_root, count)
                 c = candidate
                 candidate = next_sleeper[c]
             x, y, z = np.float64(places[c, 0]), np.float64(places[c, 1]), np.float64(places[c, 2])
-            t, s = triangle[c], np.float64(stretch[c])
-            nx, ny, nz = np.float64(normals[t, 0]), np.float64(normals[t, 1]), np.float64(normals[t, 2])
-            near = _nearest(heads, links, roots, counts, cell, mask, radius, x, y, z, s, nx, ny, nz)
+            near = _nearest(
+                heads, grid, normals, counts, cell, mask, radius, x, y, z, np.float64(stretch[c]), triangle[c]
+            )
             if near == np.inf:
                 if accepted == room:
-                    grown = np.empty((2 * room, 8), np.float32)
-                    grown[:room] = roots
-                    roots = grown
+                    spare = np.empty((2 * room, 6), np.float32)
+                    spare[:room] = grid
+                    grid, spare = spare, np.empty((2 * room, 6), np.float32)
                     chosen = np.append(chosen, np.empty(room, np.int64))
                     levels = np.append(levels, np.empty(room, np.int64))
-                    octaves = np.append(octaves, np.empty(room, np.int64))
-                    links = np.append(links, np.empty(room, np.int32))
                     room *= 2
-                octave = 0
-                while octave < OCTAVES - 1 and s > (1 << octave):
-                    octave += 1
-                roots[accepted, 0], roots[accepted, 1], roots[accepted, 2] = x, y, z
-                roots[accepted, 3], roots[accepted, 4], roots[accepted, 5] = nx, ny, nz
-                roots[accepted, 6] = s
-                octaves[accepted] = octave
+                octave = _octave(stretch[c])
                 counts[octave] += 1
                 chosen[accepted], levels[accepted] = c, level
-                _insert(heads, links, roots, octaves, accepted, cell, mask)
+                grid[accepted, 0], grid[accepted, 1], grid[accepted, 2], grid[accepted, 5] = x, y, z, stretch[c]
+                b = _bucket_of(x, y, z, octave, cell, mask)
+                links = grid.view(np.int32)
+                links[accepted, 3], links[accepted, 4] = heads[b], triangle[c]
+                heads[b] = accepted
                 accepted += 1
             elif near > 0.0:
-                wake = int(math.log(near / (FIRST_RADIUS * size)) / math.log(SHRINK)) + 1
-                wake = max(wake, level + 1)
+                wake = max(level + 1, int(math.log(near / (FIRST_RADIUS * size)) / math.log(SHRINK)) + 1)
                 if wake < MAX_LEVELS:
                     next_sleeper[c] = sleepers[wake]
                     sleepers[wake] = c
