@@ -52,7 +52,7 @@ def usual_length(scene: Scene) -> float:
 class LightMaps:
     """Textures drawn from the key light and the uniforms that let lighting.glsl read them (units 4, 5, 6)."""
 
-    def __init__(self, ctx: moderngl.Context, side: int = 2048) -> None:
+    def __init__(self, ctx: moderngl.Context, side: int = 1024) -> None:
         self.ctx = ctx
         self.side = side
         self.skin_depth = ctx.depth_texture((side, side))

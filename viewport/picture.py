@@ -13,9 +13,10 @@ from core.camera import Camera
 from core.errors import UserError
 from viewport.context import temporary_context
 from viewport.renderer import Progress, Renderer
-from viewport.scene import Scene
+from viewport.scene import Scene, thinned
 
 LARGEST_PICTURE = 16384
+MOST_HAIRS = 1_000_000  # of one coat in a picture; twenty for every pixel of the animal is enough
 
 
 def render(
@@ -23,6 +24,8 @@ def render(
     progress: Progress | None = None, ctx: moderngl.Context | None = None,
 ) -> NDArray[np.uint8]:
     """Draw the scene and return it as (height, width, 3) uint8, sRGB, top row first.
+
+    Of coats with more than MOST_HAIRS an even selection is drawn, wider.
 
     Parameters
     ----------
@@ -43,6 +46,7 @@ def render(
     if ctx is None:
         with temporary_context() as own:
             return render(scene, camera, width, height, samples, progress, own)
+    scene = scene._replace(coats=tuple(thinned(coat, MOST_HAIRS) for coat in scene.coats))
     color = ctx.renderbuffer((width, height), 3)
     target = ctx.framebuffer([color])
     renderer = Renderer(ctx)

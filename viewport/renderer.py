@@ -14,8 +14,8 @@ from viewport.drawables.guides import GuideDrawable, GuidePrograms
 from viewport.drawables.mesh import MeshDrawable, MeshPrograms
 from viewport.drawables.strands import ABSORPTION, CoatDrawable, StrandPrograms
 from viewport.light_maps import LightMaps
-from viewport.ribbons import Ribbons, far_to_near
-from viewport.scene import Scene, direction
+from viewport.ribbons import Ribbons, drawn_points, far_to_near
+from viewport.scene import Scene, direction, scene_extent
 from viewport.shaders import program, set_uniforms
 
 LARGEST_TILE = 4096  # samples on a side
@@ -30,7 +30,7 @@ class Renderer:
     written into the same buffer. Arrays whose rows were changed in place are named with :meth:`rows_changed`.
     """
 
-    def __init__(self, ctx: moderngl.Context, shadow_side: int = 2048) -> None:
+    def __init__(self, ctx: moderngl.Context, shadow_side: int = 1024) -> None:
         self.ctx = ctx
         self.mesh_programs = MeshPrograms(ctx)
         self.strand_programs = StrandPrograms(ctx)
@@ -71,13 +71,17 @@ class Renderer:
         told(0.2)
         view_row = -view_from_world(camera)[2]
         strands = [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]
-        orders = [far_to_near(points, view_row) for points in strands]
+        low, high = scene_extent(scene)
+        away = 1.0 if camera.orthographic else max(float(view_row @ [*(0.5 * (low + high)), 1.0]), camera.near)
+        scale = pixel_scale(camera, size[1]) * samples / away
+        pieces = [drawn_points(points, scale) for points in strands]
+        orders = [far_to_near(points, view_row, drawn) for points, drawn in zip(strands, pieces, strict=True)]
         tiles = _tiles(size, samples)
         for number, tile in enumerate(tiles):
             def tile_told(part: float, number: int = number) -> None:
                 told(0.2 + 0.8 * (number + part) / len(tiles))
 
-            self._draw_tile(scene, camera, size, samples, tile, lighting, orders, tile_told)
+            self._draw_tile(scene, camera, size, samples, tile, lighting, orders, pieces, tile_told)
             self._resolve_tile(scene, framebuffer, size, samples, tile)
         told(1.0)
 
@@ -94,7 +98,7 @@ class Renderer:
 
     def _draw_tile(
         self, scene: Scene, camera: Camera, size: tuple[int, int], samples: int, tile: tuple[int, int, int, int],
-        lighting: dict[str, Any], orders: list[NDArray[np.uint32]], told: Progress,
+        lighting: dict[str, Any], orders: list[NDArray[np.uint32]], pieces: list[NDArray[np.intp]], told: Progress,
     ) -> None:
         _, _, width, height = tile
         wide, high = width * samples, height * samples
@@ -124,12 +128,12 @@ class Renderer:
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
         total, before = sum(len(order) for order in orders), 0
         try:
-            for textures, order in zip(drawn, orders, strict=True):
+            for textures, order, points in zip(drawn, orders, pieces, strict=True):
                 def slice_told(part: float, before: int = before, count: int = len(order)) -> None:
                     self.ctx.finish()
                     told((before + part * count) / total)
 
-                self.ribbons.draw(textures, order, matrix, (wide, high), slice_told)
+                self.ribbons.draw(textures, order, points, matrix, (wide, high), slice_told)
                 before += len(order)
         finally:
             target.depth_mask = True

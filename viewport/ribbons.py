@@ -12,18 +12,36 @@ from viewport.shaders import program, set_uniforms
 from viewport.strand_textures import StrandTextures, points_by_axis
 
 SEGMENTS_AT_ONCE = 1 << 17  # between two calls of the progress
-CORNERS = np.array([0, 1, 2, 2, 1, 3], np.uint32)
+SHORTEST_PIECE = 3.5  # samples; pieces of hair shorter than that in the middle are joined
 
 
-def far_to_near(points: np.ndarray, view_row: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Order of all segments by decreasing depth of their middle, (N * (P - 1),) uint32, strand-major numbers.
+def drawn_points(points: np.ndarray, samples_per_metre: float) -> NDArray[np.intp]:
+    """Which points of every strand are drawn: all, or every second, third ... and the last where pieces are tiny.
+
+    points : (N, 3, P) or (N, P, 3) float32. samples_per_metre : in the middle of the scene.
+    """
+    some = points[:: max(1, len(points) // 2000)]
+    count = points.shape[2] if points.shape[1] == 3 else points.shape[1]
+    if len(some) == 0:
+        return np.arange(count)
+    pieces = np.sqrt(sum(np.diff(v, axis=1).astype(np.float64) ** 2 for v in points_by_axis(some)))
+    piece = float(np.median(pieces)) * samples_per_metre
+    step = int(np.clip(np.rint(SHORTEST_PIECE / max(piece, 1e-9)), 1, max(1, (count - 1) // 4)))
+    return np.unique(np.append(np.arange(0, count, step), count - 1))
+
+
+def far_to_near(
+    points: np.ndarray, view_row: NDArray[np.float64], drawn: NDArray[np.intp] | None = None
+) -> NDArray[np.uint32]:
+    """Order of all pieces by decreasing depth of their middle, (N * (D - 1),) uint32, strand-major numbers.
 
     points : (N, 3, P) or (N, P, 3) float32. view_row : (4,) float64, depth = view_row . (x, y, z, 1).
+    drawn : the D points that are drawn (all by default); a piece lies between two of them.
 
     Depth is cut into 65,536 steps, so that numpy sorts by radix, in one pass over the data; equal steps keep their
     order, which makes pictures repeat to the bit.
     """
-    x, y, z = points_by_axis(points)
+    x, y, z = (v if drawn is None or len(drawn) == v.shape[1] else v[:, drawn] for v in points_by_axis(points))
     a, b, c = (np.float32(v) for v in view_row[:3])
     depth = x * a
     depth += y * b
@@ -47,23 +65,28 @@ class Ribbons:
         self.vertices = ctx.vertex_array(self.program, [], index_buffer=self.indices, index_element_size=4)
 
     def draw(
-        self, strands: StrandTextures, order: NDArray[np.uint32], clip_from_world: NDArray[np.float64],
-        size: tuple[int, int], slice_done: Callable[[float], object],
+        self, strands: StrandTextures, order: NDArray[np.uint32], drawn: NDArray[np.intp],
+        clip_from_world: NDArray[np.float64], size: tuple[int, int], slice_done: Callable[[float], object],
     ) -> None:
-        """Blend the segments into the bound framebuffer in the given order, testing depth but not writing it."""
+        """Blend the pieces into the bound framebuffer in the given order, testing depth but not writing it."""
         strands.bind(self.program)
         strands.sides.use(1)
         strands.colors.use(2)
         set_uniforms(self.program, {
             "strand_sides": 1, "strand_colors": 2, "clip_from_world": clip_from_world, "picture_size": size,
         })
-        pieces = np.uint32(strands.per_strand - 1)
+        pieces = np.uint32(len(drawn) - 1)
+        start_left, end_left = 2 * drawn[:-1], 2 * drawn[1:]
+        corners = np.stack(
+            [start_left, start_left + 1, end_left, end_left, start_left + 1, end_left + 1], axis=1
+        ).astype(np.uint32)
         for start in range(0, len(order), SEGMENTS_AT_ONCE):
             segments = order[start : start + SEGMENTS_AT_ONCE]
             strand, piece = np.divmod(segments, pieces)
-            first = (strand * np.uint32(strands.per_strand) + piece) * np.uint32(2)
+            vertices = corners[piece]
+            vertices += (strand * np.uint32(2 * strands.per_strand))[:, None]
             self.indices.orphan()
-            self.indices.write((first[:, None] + CORNERS).data)
+            self.indices.write(vertices.data)
             self.vertices.render(moderngl.TRIANGLES, vertices=6 * len(segments))
             slice_done((start + len(segments)) / len(order))
 

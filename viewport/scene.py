@@ -107,6 +107,22 @@ class Scene(NamedTuple):
     exposure: float = 1.0
 
 
+def thinned(coat: Coat, most: int) -> Coat:
+    """The coat with at most `most` hairs: every second, third ... row.
+
+    They are made wider, between what keeps the look of one hair and what keeps the cover of all. Rows of grown coats are sorted by place, so that equal steps leave an even coat.
+    """
+    step = -(-len(coat.points) // max(most, 1))
+    if step <= 1:
+        return coat
+    look, wider = coat.look, step**0.75
+    return Coat(
+        np.ascontiguousarray(coat.points[::step]), np.asarray(coat.ids)[::step], coat.normals[::step],
+        look._replace(root_width=look.root_width * wider, tip_width=look.tip_width * wider),
+        None if coat.tints is None else coat.tints[::step],
+    )
+
+
 def skin_under(look: Look) -> Color:
     """The colour of skin that never shines through a coat of that look."""
     r, g, b = (0.6 * c for c in look.root)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.viewport.scenes import FLAT, ball, camera, hairs, quad
 from viewport.drawables.strands import ABSORPTION
 from viewport.light_maps import light_frame
 from viewport.scene import Lights, Scene, all_points
-
-from tests.viewport.scenes import FLAT, ball, camera, hairs, quad
 
 W, H = 160, 160
 KEY_ONLY = {
@@ -46,7 +45,7 @@ def test_lights_follow_the_camera_unless_told_otherwise(draw):
 
 def test_skin_between_light_and_hair_takes_the_light(draw):
     roots = np.stack([np.linspace(-0.4, 0.4, 30), np.full(30, -0.3), np.zeros(30)], 1)
-    coat = hairs(roots, roots + [0.0, 0.6, 0.0])
+    coat = hairs(roots, roots + np.array([0.0, 0.6, 0.0]))
     lights = Lights(key=(0.0, 0.0, -1.0), follow_camera=False, **KEY_ONLY)
     open_sky = draw(Scene(coats=(coat,), lights=lights), camera(), W, H)
     shaded = draw(Scene(surfaces=(quad(z=-0.5),), coats=(coat,), lights=lights), camera(), W, H)
@@ -64,7 +63,7 @@ def test_light_through_a_curtain_of_hair_follows_beers_law(draw):
     seen = []
     for cover in (1e-6, 0.5, 1.0, 2.0):
         look = FLAT._replace(root_width=cover * 3.0 / 1500, tip_width=cover * 3.0 / 1500)
-        curtain = hairs(roots, roots + [0.0, 3.0, 0.0], look=look)
+        curtain = hairs(roots, roots + np.array([0.0, 3.0, 0.0]), look=look)
         image = draw(Scene(surfaces=(quad(z=-0.9, half=0.5),), coats=(curtain,), lights=lights), below, W, H)
         skin = image[H // 2 - 1 : H // 2 + 2, W // 2 - 15 : W // 2 + 16, 1]
         seen.append(skin.mean())

@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 
 from core.errors import UserError
+from tests.viewport.scenes import FLAT, ball, camera
 from viewport.context import standalone_context
 from viewport.picture import render, render_png, write_png
-from viewport.scene import Scene
-
-from tests.viewport.scenes import ball, camera
+from viewport.scene import Scene, thinned
 
 
 def test_a_png_holds_the_picture(ctx, tmp_path):
@@ -44,6 +43,18 @@ def test_a_picture_that_cannot_be_written_says_so_and_leaves_the_old_one(tmp_pat
 def test_impossible_sizes_are_refused(size):
     with pytest.raises(UserError, match="cannot be drawn"):
         render(Scene(), camera(), *size)
+
+
+def test_a_thinned_coat_keeps_ids_and_looks_alike(ctx):
+    look = FLAT._replace(root_width=0.008, tip_width=0.004)
+    skin, coat = ball(count=20000, look=look)
+    few = thinned(coat, 7000)
+    assert thinned(coat, 20000) is coat
+    assert len(few.points) == len(few.ids) == len(few.normals) == 6667
+    assert np.array_equal(few.points[5], coat.points[15])
+    assert few.ids[5] == coat.ids[15]
+    many_, few_ = (render(Scene((skin,), (c,)), camera(), 90, 90, 1, ctx=ctx).astype(float) for c in (coat, few))
+    assert abs(many_.mean() - few_.mean()) < 6.0
 
 
 def test_without_a_driver_the_message_says_what_to_install(ctx):

@@ -11,12 +11,11 @@ import pytest
 
 import viewport.renderer
 from core.camera import project
+from tests.viewport.scenes import FLAT, ball, camera, hairs
 from viewport.context import collect
 from viewport.picture import render
 from viewport.renderer import Renderer
 from viewport.scene import Coat, GuideLines, Look, Scene, Surface
-
-from tests.viewport.scenes import FLAT, ball, camera, hairs
 
 W, H = 200, 150
 
@@ -75,7 +74,8 @@ def test_more_samples_change_edges_only(ctx):
 
 def test_hair_behind_and_through_the_eye_does_no_harm(draw):
     look = FLAT._replace(root_width=0.01, tip_width=0.01)
-    coat = hairs([[0.1, 0, 2.0], [0, 0, 6.0], [0.0, 0.0, 4.0]], [[0.1, 0, 7.0], [0, 1, 8.0], [0.0, 0.0, 4.0]], look=look)
+    roots, tips = [[0.1, 0, 2.0], [0, 0, 6.0], [0, 0, 4.0]], [[0.1, 0, 7.0], [0, 1, 8.0], [0, 0, 4.0]]
+    coat = hairs(roots, tips, look=look)
     image = draw(Scene(coats=(coat,)), camera(), W, H)
     assert np.isfinite(image).all()
     assert image[..., 3].mean() < 0.5
@@ -83,7 +83,7 @@ def test_hair_behind_and_through_the_eye_does_no_harm(draw):
 
 def test_degenerate_hair_and_skin_do_no_harm(draw):
     roots = np.array([[0.2, 0.1, 0.0], [-0.2, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    coat = hairs(roots, roots + [[0, 0, 0], [0, 0, 0], [0, 0.4, 0]], normals=np.zeros((3, 3)))
+    coat = hairs(roots, roots + np.array([[0, 0, 0], [0, 0, 0], [0, 0.4, 0]]), normals=np.zeros((3, 3)))
     flat = np.zeros((3, 3), np.float32)
     needle = Surface(flat, flat, np.array([[0, 1, 2], [0, 0, 0]], np.int32))
     image = draw(Scene(surfaces=(needle,), coats=(coat,)), camera(), W, H)

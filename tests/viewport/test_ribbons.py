@@ -7,10 +7,9 @@ import pytest
 
 from core.camera import pixel_scale, project, view_from_world
 from core.random import rand
-from viewport.ribbons import far_to_near
-from viewport.scene import Scene
-
 from tests.viewport.scenes import FLAT, camera, hairs, quad
+from viewport.ribbons import drawn_points, far_to_near
+from viewport.scene import Scene
 
 W, H = 200, 120
 
@@ -77,7 +76,8 @@ def test_skin_hides_hair_behind_it_and_not_before_it(draw):
     stripe = slice(H // 2 - 2, H // 2 + 2), slice(W // 2 - 8, W // 2 + 8)
     other = slice(H // 2 - 12, H // 2 - 8), slice(W // 2 - 8, W // 2 + 8)
     np.testing.assert_allclose(hidden[stripe], hidden[other], rtol=0.02)
-    shown = draw(both._replace(coats=(hairs(*before, look=FLAT._replace(gloss=0.0), tints=[[0.0, 0.0, 9.0]]),)), cam, W, H)
+    blue = hairs(*before, look=FLAT._replace(gloss=0.0), tints=[[0.0, 0.0, 9.0]])
+    shown = draw(both._replace(coats=(blue,)), cam, W, H)
     assert (shown[stripe][..., 2] / shown[stripe][..., 0]).max() > 1.5
 
 
@@ -101,3 +101,17 @@ def test_order_is_by_depth_for_both_layouts():
     assert np.array_equal(np.sort(order), np.arange(500 * 8))
     assert np.diff(middle[order]).max() <= 2 * np.ptp(middle) / 65535
     assert np.array_equal(order, far_to_near(np.ascontiguousarray(points.transpose(0, 2, 1)), row))
+
+
+def test_tiny_pieces_of_hair_are_joined_and_both_ends_kept(draw):
+    points = hairs([0.0, 0.0, 0.0], [0.0, 1.5, 0.0], points=16).points  # pieces of 0.1
+    assert np.array_equal(drawn_points(points, 1000.0), np.arange(16))
+    assert np.array_equal(drawn_points(points, 17.5), [0, 2, 4, 6, 8, 10, 12, 14, 15])
+    assert np.array_equal(drawn_points(points, 1e-3), [0, 3, 6, 9, 12, 15])
+    assert np.array_equal(drawn_points(points[:, :, :3], 1e-3), [0, 1, 2])
+    cam = camera(orthographic=True, height=2.0)
+    metres = 2.0 / pixel_scale(cam, H)
+    look = FLAT._replace(root_width=metres, tip_width=metres)
+    for count in (3, 16, 60):  # 96 pixels long: pieces of 48, 6 and 1.6 pixels cover the same
+        alpha = draw(Scene(coats=(hairs([0, -0.8, 0], [0, 0.8, 0], points=count, look=look),)), cam, W, H)[..., 3]
+        assert abs(alpha.sum() / (2.0 * width_factor(0) * 96) - 1.0) < 0.02

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from core.camera import project
+from tests.viewport.scenes import camera, hairs
 from viewport.renderer import Renderer
 from viewport.scene import Coat, GuideLines, Scene
 from viewport.strand_textures import StrandTextures
-
-from tests.viewport.scenes import camera, hairs
 
 W, H = 160, 120
 
@@ -19,7 +18,7 @@ def grid(count: int) -> Coat:
     side = int(np.ceil(np.sqrt(count)))
     i = np.arange(count)
     roots = np.stack([(i % side) / side - 0.5, (i // side) / side - 0.5, 0.0 * i], 1)
-    return hairs(roots, roots + [0.0, 0.02, 0.0], points=16)
+    return hairs(roots, roots + np.array([0.0, 0.02, 0.0]), points=16)
 
 
 @pytest.mark.parametrize("count", [1, 255, 256, 257, 1000])
