@@ -16,6 +16,7 @@ from core.formats import curve_file
 from core.formats.project import write_project
 from core.groom.children import Children
 from core.groom.export import groom_strands
+from core.groom.flow import nose_vertex
 from core.groom.strands import GroomStrands
 from core.mesh.skin import Skin, skin_at_rest, skin_posed
 from core.pose.skinning import posed_points
@@ -23,6 +24,7 @@ from core.pose.skinning import posed_points
 if TYPE_CHECKING:
     from viewport.scene import Scene
 
+# where the camera looks, seen from an animal that faces +z
 VIEWS = {
     "three-quarter": (-0.85, -0.35, -1.0), "front": (0.0, -0.08, -1.0), "back": (0.0, -0.08, 1.0),
     "left": (-1.0, -0.08, 0.0), "right": (1.0, -0.08, 0.0), "top": (0.0, -1.0, -0.02),
@@ -76,20 +78,32 @@ def draw(
     from viewport.document_scene import scene_of  # GL is loaded only when a picture is asked for
 
     shown = posed_document(document, None, evaluator) if skins is None else skins
-    _picture(path, scene_of(document, shown, children), size, view)
+    _picture(path, scene_of(document, shown, children), size, _turned(VIEWS[view], shown))
+
+
+def _turned(view: tuple[float, float, float], skins: Mapping[int, Skin]) -> tuple[float, float, float]:
+    """The view, turned about the vertical so that front is where the first animal looks."""
+    skin = next(iter(skins.values()), None)
+    nose = -1 if skin is None else nose_vertex(skin.points, skin.triangles.vertices)
+    if skin is None or nose < 0:
+        return view
+    ahead = skin.points[nose] - 0.5 * (skin.points.min(axis=0) + skin.points.max(axis=0))
+    quarter = round(np.arctan2(ahead[0], ahead[2]) / (0.5 * np.pi)) * 0.5 * np.pi
+    c, s = float(np.cos(quarter)), float(np.sin(quarter))
+    return (c * view[0] + s * view[2], view[1], c * view[2] - s * view[0])
 
 
 def draw_strands(path: Path, groom: GroomStrands, size: tuple[int, int], view: str) -> None:
     """Draw a groom file that came without its animal."""
     from viewport.document_scene import scene_of_strands
 
-    _picture(path, scene_of_strands(groom), size, view)
+    _picture(path, scene_of_strands(groom), size, VIEWS[view])
 
 
-def _picture(path: Path, scene: Scene, size: tuple[int, int], view: str) -> None:
+def _picture(path: Path, scene: Scene, size: tuple[int, int], view: tuple[float, float, float]) -> None:
     from viewport.picture import render_png
     from viewport.scene import all_points
 
     clouds = [points for points in all_points(scene) if len(points)]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3), np.float32)
-    render_png(path, scene, frame_points(points, VIEWS[view], size[0] / size[1]), size)
+    render_png(path, scene, frame_points(points, view, size[0] / size[1]), size)

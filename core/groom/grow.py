@@ -14,7 +14,7 @@ from core.groom.dress import Stage, no_stages
 from core.groom.groom import Groom
 from core.groom.maps import density_at, sample_map
 from core.groom.resample import with_point_count
-from core.groom.settle import count_inside_segments, settle
+from core.groom.settle import inside_segments, settle, settle_exactly
 from core.mesh.bvh import closest_points
 from core.mesh.distance_field import build_distance_field
 from core.mesh.edges import is_closed
@@ -22,7 +22,7 @@ from core.mesh.intrinsic import bind
 from core.mesh.mesh import Mesh
 from core.mesh.scatter import Scatter, scatter
 from core.mesh.signed_distance import build_signed_skin
-from core.mesh.skin import Skin, distance_field, root_places, skin_at_rest
+from core.mesh.skin import Skin, distance_field, root_places, signed_skin, skin_at_rest
 from core.mesh.surface import root_normals, strands_on_deformed
 from core.random import rand
 from core.value import evaluate as evaluate_value
@@ -67,6 +67,9 @@ def grow(
     with stage("settle"):
         field = build_distance_field(skin.points, skin.triangles.vertices) if posed else distance_field(mesh, evaluator)
         settle(children.points, field, workers=workers)
+        if is_closed(mesh):
+            signed = signed_skin(mesh, evaluator) if not posed else build_signed_skin(skin.points, skin.triangles.vertices)
+            settle_exactly(children.points, field, signed, INSIDE_TOLERANCE * skin.diagonal, workers)
     return children
 
 
@@ -109,13 +112,13 @@ class Figures(NamedTuple):
 def measure(groom: Groom, mesh: Mesh, children: Children, evaluator: Evaluator) -> Figures:
     """How well hairs at rest stand on their skin."""
     skin = skin_at_rest(mesh, evaluator)
-    signed = build_signed_skin(mesh.points, skin.triangles.vertices)
     roots = np.ascontiguousarray(children.points[:, :, 0])
     _, _, distance = closest_points(skin.bvh, roots, workers=evaluator.workers)
     error = float(distance.max()) / skin.diagonal if len(roots) else 0.0
     if not is_closed(mesh):
         return Figures(error, None)
-    inside = count_inside_segments(
-        children.points, distance_field(mesh, evaluator), signed, INSIDE_TOLERANCE * skin.diagonal, evaluator.workers
+    inside = inside_segments(
+        children.points, distance_field(mesh, evaluator), signed_skin(mesh, evaluator),
+        INSIDE_TOLERANCE * skin.diagonal, evaluator.workers,
     )
-    return Figures(error, inside)
+    return Figures(error, int(inside.sum()))

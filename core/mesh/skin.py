@@ -13,6 +13,7 @@ from core.mesh.distance_field import DistanceField, build_distance_field
 from core.mesh.mesh import Mesh, Triangles
 from core.mesh.normals import mesh_normals
 from core.mesh.roots import Roots
+from core.mesh.signed_distance import SignedSkin, build_signed_skin
 from core.mesh.surface import root_positions
 from core.mesh.triangulate import triangulate
 
@@ -52,6 +53,11 @@ def distance_field(mesh: Mesh, evaluator: Evaluator) -> DistanceField:
     return evaluator.get(_field, mesh)
 
 
+def signed_skin(mesh: Mesh, evaluator: Evaluator) -> SignedSkin:
+    """Exact signed distances to the mesh at rest, remembered by the evaluator."""
+    return evaluator.get(_signed, mesh)
+
+
 def _rest(mesh: Mesh) -> Skin:
     triangles = triangulate(mesh)
     return Skin(
@@ -62,6 +68,10 @@ def _rest(mesh: Mesh) -> Skin:
 
 def _field(mesh: Mesh) -> DistanceField:
     return build_distance_field(mesh.points, triangulate(mesh).vertices)
+
+
+def _signed(mesh: Mesh) -> SignedSkin:
+    return build_signed_skin(mesh.points, triangulate(mesh).vertices)
 
 
 def _diagonal(points: np.ndarray) -> float:
