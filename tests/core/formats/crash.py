@@ -92,7 +92,7 @@ def kill_journals(crasher, times):
     torn = 0
     for seed in range(times):
         folder = crasher.folder / f"journal{seed}"
-        lines = crasher.kill("journal", folder, seed, crasher.random.uniform(0.005, 0.12))
+        lines = crasher.kill("journal", folder, seed, crasher.random.uniform(0.005, 0.15))
         acknowledged, sent = _newest(lines, "ack"), _newest(lines, "sent")
         found = _recovered(folder, seed)
         assert found >= acknowledged

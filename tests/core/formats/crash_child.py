@@ -18,7 +18,7 @@ from core.formats.recovery import recover_newest
 from tests.documents import small_document, stroked
 from tools.session import Session
 
-GUIDES, SIDE, POINTS = 60, 6, 8
+GUIDES, SIDE, POINTS = 8, 2, 4
 
 
 def state(seed: int, number: int) -> Document:
@@ -45,7 +45,7 @@ def save_for_ever(folder: Path, seed: int) -> None:
 
 def journal_for_ever(folder: Path, seed: int) -> None:
     """Commit state after state, paced like a very quick hand; small generations, so that kills meet compaction too."""
-    journal = Journal(folder, generation_bytes=100_000, patience=10.0)
+    journal = Journal(folder, generation_bytes=0, patience=10.0)
     for number in range(1, 100_000):
         journal.commit(state(seed, number), Workspace())
         if journal.durable:
