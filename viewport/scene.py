@@ -110,7 +110,8 @@ class Scene(NamedTuple):
 def thinned(coat: Coat, most: int) -> Coat:
     """The coat with at most `most` hairs: every second, third ... row.
 
-    They are made wider, between what keeps the look of one hair and what keeps the cover of all. Rows of grown coats are sorted by place, so that equal steps leave an even coat.
+    They are made wider, between what keeps the look of one hair and what keeps the cover of all. Rows of
+    grown coats are sorted by place, so that equal steps leave an even coat.
     """
     step = -(-len(coat.points) // max(most, 1))
     if step <= 1:
