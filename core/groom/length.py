@@ -95,7 +95,7 @@ def _cut(guides: Guides, at: NDArray[np.float64], mask: NDArray[np.bool_] | None
 
 def _screen(guides: Guides, view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     pixels, w = view.pixels(guides.points)
-    return np.ascontiguousarray(pixels), np.ascontiguousarray(np.broadcast_to(w, pixels.shape[:-1]))
+    return np.array(pixels, order="C"), np.array(w, order="C")
 
 
 @njit(cache=True, nogil=True)

@@ -49,9 +49,10 @@ class View(NamedTuple):
             eye = np.linalg.solve(m[[0, 1, 3], :3], -m[[0, 1, 3], 3])
             d = eye - p
         else:
-            d = np.broadcast_to(np.cross(m[0, :3], m[1, :3]), p.shape).copy()
-            if float(d.reshape(-1, 3)[0] @ m[2, :3]) > 0.0:  # depth grows away from the eye
-                d = -d
+            back = np.cross(m[0, :3], m[1, :3])
+            if float(back @ m[2, :3]) > 0.0:  # depth grows away from the eye
+                back = -back
+            d = np.broadcast_to(back, p.shape)
         return d / np.maximum(np.linalg.norm(d, axis=-1, keepdims=True), 1e-300)
 
 

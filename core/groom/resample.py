@@ -75,6 +75,7 @@ def with_point_count(guides: Guides, count: int) -> Guides:
     hold = np.empty((len(guides), count), np.float32)
     for row in range(len(guides)):
         hold[row] = np.interp(at, fractions[row], guides.hold[row])
+    hold[hold > 1.0 - 1e-5] = 1.0  # locked stays locked
     return guides.replace(points=freeze(points), hold=freeze(hold))
 
 

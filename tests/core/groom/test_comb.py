@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -114,8 +113,10 @@ def test_what_is_kept_whatever_the_stroke(stroke):
     before = mixed(seed)
     v = view(tuple(rng.normal(size=3)), orthographic)
     path = rng.uniform(50, 350, 2) + np.cumsum(rng.normal(0, 40, (5, 2)), axis=0)
-    options = dict(
-        field=ball().field, grip=grip, lay=lay, tip_first=tip_first, lift=lift, strength=float(rng.random()))
+    options = {
+        "field": ball().field, "grip": grip, "lay": lay, "tip_first": tip_first, "lift": lift,
+        "strength": float(rng.random()),
+    }
     after = comb(before, v, path, radius, **options)
     stays(before, after)
     assert np.abs(segment_lengths(after) / segment_lengths(before) - 1).max() < 1e-5
@@ -128,7 +129,7 @@ def test_threads_give_the_same_bits():
     workers = Workers(3)
     g = fur(60)
     path = np.array([[100.0, 150.0], [260.0, 220.0]])
-    kw = dict(field=ball().field)
+    kw = {"field": ball().field}
     split = comb(g, view(), path, 90, ranges=lambda n, call: workers.ranges(n, call, 1), **kw)
     workers.close()
     assert np.array_equal(split.points, comb(g, view(), path, 90, **kw).points)
@@ -150,10 +151,12 @@ def test_a_mask_spares_the_far_side_and_one_side_of_a_parting():
     front = facing(g, v, 0.0)
     after = comb(g, v, path, 120, mask=front)
     moved = (after.points != g.points).any(axis=(1, 2))
-    assert moved.any() and not moved[~front].any()
+    assert moved.any()
+    assert not moved[~front].any()
     left = side_of_line(g, v, [[200, 50], [200, 350]]) > 0
     moved = (comb(g, v, path, 120, mask=left).points != g.points).any(axis=(1, 2))
-    assert moved.any() and not moved[~left].any()
+    assert moved.any()
+    assert not moved[~left].any()
 
 
 def test_the_grip_moves_the_contact_with_the_pointer_in_perspective():
