@@ -42,9 +42,10 @@ def test_a_sphere_in_closed_form() -> None:
     out = np.empty((20_000, 5))
     _gradients(field.values, field.origin, field.cell, queries, out)
     np.testing.assert_allclose(out[:, 0], out[:, 4], atol=1e-7)
-    cosine = (out[within, 1:4] * ways[within]).sum(1)
+    inner = np.abs(radius - 1) < 0.06  # a cell's diagonal from the clamp
+    cosine = (out[inner, 1:4] * ways[inner]).sum(1)
     assert cosine.min() > 0.98
-    assert np.linalg.norm(out[within, 1:4], axis=1).max() < 1.03
+    assert np.linalg.norm(out[inner, 1:4], axis=1).max() < 1.03
     assert np.abs(out[clamped, 1:4]).max() == 0
 
 
