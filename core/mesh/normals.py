@@ -20,18 +20,12 @@ def face_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> N
 
     Counter-clockwise corners seen from outside; a triangle without area gets a zero normal.
     """
-    normals = np.empty((len(triangles), 3), np.float32)
-    areas = np.empty(len(triangles), np.float64)
-    _faces(points, triangles, normals, areas)
-    return normals
+    return _normals_and_areas(points, triangles)[0]
 
 
 def face_areas(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Areas (T,) float64, in the square of the unit of `points`."""
-    normals = np.empty((len(triangles), 3), np.float32)
-    areas = np.empty(len(triangles), np.float64)
-    _faces(points, triangles, normals, areas)
-    return areas
+    return _normals_and_areas(points, triangles)[1]
 
 
 def vertex_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -41,7 +35,7 @@ def vertex_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) ->
     Polygonal Facets", 1998). A vertex without a face of some area gets a zero normal.
     """
     counts = np.full(len(triangles), 3, np.int32)
-    return _polygon_vertex_normals(points, counts, np.ascontiguousarray(triangles).reshape(-1))
+    return _polygon_vertex_normals(points, counts, np.ascontiguousarray(triangles, np.int32).reshape(-1))
 
 
 def mesh_normals(mesh: Mesh, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
@@ -52,11 +46,20 @@ def mesh_normals(mesh: Mesh, points: NDArray[np.float32] | None = None) -> NDArr
     return _polygon_vertex_normals(mesh.points if points is None else points, mesh.counts, mesh.corners)
 
 
+def _normals_and_areas(
+    points: NDArray[np.float32], triangles: NDArray[np.int32]
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    normals = np.empty((len(triangles), 3), np.float32)
+    areas = np.empty(len(triangles), np.float64)
+    _faces(np.ascontiguousarray(points, np.float32), np.ascontiguousarray(triangles, np.int32), normals, areas)
+    return normals, areas
+
+
 def _polygon_vertex_normals(
     points: NDArray[np.float32], counts: NDArray[np.int32], corners: NDArray[np.int32]
 ) -> NDArray[np.float32]:
     total = np.zeros((len(points), 3), np.float64)
-    _gather_polygons(points, counts, corners, total)
+    _gather_polygons(np.ascontiguousarray(points, np.float32), counts, corners, total)
     normals = np.empty((len(points), 3), np.float32)
     _normalise(total, normals)
     return normals

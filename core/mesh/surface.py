@@ -64,7 +64,8 @@ def root_vertices(mesh: Mesh, roots: Roots) -> NDArray[np.int32]:
 def root_positions(mesh: Mesh, roots: Roots, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
     """Where the roots lie, (N, 3) float32, on the mesh at rest or at deformed `points` (V, 3) float32."""
     out = np.empty((len(roots.faces), 3), np.float32)
-    _blend(mesh.points if points is None else points, root_vertices(mesh, roots), roots.weights, out)
+    places = mesh.points if points is None else np.ascontiguousarray(points, np.float32)
+    _blend(places, root_vertices(mesh, roots), roots.weights, out)
     return out
 
 
@@ -89,6 +90,7 @@ def root_frames(
     """
     if points is None:
         return roots.frames
+    points = np.ascontiguousarray(points, np.float32)
     if normals is None:
         normals = mesh_normals(mesh, points)
     out = np.empty((len(roots.faces), 3, 3), np.float32)
