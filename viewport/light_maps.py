@@ -100,7 +100,7 @@ class LightMaps:
             coat.draw_opacity(texel, described)
         ctx.disable(moderngl.BLEND)
         return {
-            **described, "skin_depth": 5, "coat_opacity": 6, "tap_spread": 1.6,
+            **described, "skin_depth": 5, "coat_opacity": 6, "tap_spread": 2.0,
             "skin_bias": max(0.12 * length, 4.0 * texel),
         }
 
