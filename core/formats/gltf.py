@@ -31,6 +31,7 @@ UNREADABLE = {
     "EXT_meshopt_compression": "meshopt compression",
     "KHR_meshopt_compression": "meshopt compression",
 }
+MOST_PIECES = 20_000
 MOST_CORNERS = 100_000_000  # nodes may place one mesh many times; past this it is no mesh to groom
 
 
@@ -93,7 +94,8 @@ def read_gltf(path: Path) -> Polygons:
             raise UserError(f"{path.name} uses {UNREADABLE[extension]}; export it again without it.")
     buffers = [_buffer(path, buffer, chunk if row == 0 else None) for row, buffer in enumerate(gltf.buffers)]
     try:
-        pieces = _pieces(path, gltf, buffers)
+        with np.errstate(all="ignore"):  # what is not finite is found by the repair
+            pieces = _pieces(path, gltf, buffers)
     except (IndexError, ValueError, OverflowError) as error:
         raise UserError(f"{path.name} contradicts itself ({error}); export it again.") from None
     if not pieces:
@@ -198,9 +200,11 @@ def _buffer(path: Path, buffer: Buffer, chunk: bytes | None) -> bytes:
 def _pieces(path: Path, gltf: Gltf, buffers: list[bytes]) -> list[Polygons]:
     pieces: list[Polygons] = []
     total = 0
-    for node, world in _placed_nodes(path, gltf):
-        if node.mesh is None:
-            continue
+    placed = [(node, world) for node, world in _placed_nodes(path, gltf) if node.mesh is not None]
+    if sum(len(gltf.meshes[_row(node.mesh or 0)].primitives) for node, _ in placed) > MOST_PIECES:
+        raise UserError(f"{path.name} shows more than {MOST_PIECES:,} pieces; join them before the export.")
+    for node, world in placed:
+        assert node.mesh is not None
         source = gltf.meshes[_row(node.mesh)]
         name = node.name or source.name or "mesh"
         of_node: list[Polygons] = []
@@ -271,8 +275,7 @@ def _primitive(
     def get(row: int, width: int) -> NDArray[np.float64]:
         return read_accessor(gltf.accessors[_row(row)], gltf.buffer_views, buffers, width)
 
-    with np.errstate(all="ignore"):  # what is not finite is found by the repair
-        points = get(primitive.attributes["POSITION"], 3) @ world[:3, :3].T + world[:3, 3]
+    points = get(primitive.attributes["POSITION"], 3) @ world[:3, :3].T + world[:3, 3]
     index = np.arange(len(points))
     if primitive.indices is not None:
         index = get(primitive.indices, 1)[:, 0].astype(np.int64)

@@ -44,6 +44,7 @@ class Request(msgspec.Struct):
     """What the child is asked to do, as one JSON object on its standard input."""
 
     target: str
+    what: str
     arguments: dict[str, Any]
     answer: str
     seconds: float
@@ -100,7 +101,9 @@ def run_bounded(
         raise ValueError(f"{target} is not package.module:function")
     with tempfile.TemporaryDirectory(prefix="filoplume-", ignore_cleanup_errors=True) as folder:
         answer = Path(folder) / "answer"
-        request = Request(target=target, arguments=dict(arguments), answer=str(answer), seconds=seconds, memory=memory)
+        request = Request(
+            target=target, what=what, arguments=dict(arguments), answer=str(answer), seconds=seconds, memory=memory
+        )
         code = _run_child(msgspec.json.encode(request), what, seconds, cancel)
         if not answer.is_file():
             raise UserError(_obituary(what, code))
@@ -199,11 +202,12 @@ def child_main() -> None:
         _send(Path(request.answer), Answer(error=str(error)), {})
     except MemoryError:
         arrays.clear()
-        _send(Path(request.answer), Answer(error="The file needed too much memory to read; it may be damaged."), {})
+        sentence = f"{request.what} needed too much memory to read; it may be damaged."
+        _send(Path(request.answer), Answer(error=sentence), {})
     except Exception as error:  # whatever a native parser throws becomes one sentence here
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        detail = traceback.format_exc()[-4000:]
-        _send(Path(request.answer), Answer(error=f"The file could not be read: {reason}", detail=detail), {})
+        reason = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
+        sentence = f"{request.what} could not be read ({reason}); it may be damaged."
+        _send(Path(request.answer), Answer(error=sentence, detail=traceback.format_exc()[-4000:]), {})
     os._exit(0)  # destructors of native libraries have nothing left to do for us
 
 

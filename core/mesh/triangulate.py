@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, types
-from numpy.typing import NDArray
 
 from core.mesh.mesh import Mesh, Triangles
 
@@ -35,11 +34,7 @@ def triangulate(mesh: Mesh) -> Triangles:
     corners[first[threes]] = starts[threes, None] + np.arange(3)
     fours = np.flatnonzero(mesh.counts == 4)
     if len(fours):
-        square = starts[fours, None] + np.arange(4)
-        second = _takes_second_diagonal(mesh.points[mesh.corners[square]].astype(np.float64))[:, None]
-        a, b, c, d = square.T
-        corners[first[fours]] = np.where(second, np.stack([a, b, d], 1), np.stack([a, b, c], 1))
-        corners[first[fours] + 1] = np.where(second, np.stack([b, c, d], 1), np.stack([a, c, d], 1))
+        _cut_quads(mesh.points, mesh.corners, starts, first, fours, corners)
     many = np.flatnonzero(mesh.counts > 4)
     if len(many):
         _clip_ears(mesh.points, mesh.corners, starts, first, mesh.counts, many, BUDGET, corners)
@@ -50,26 +45,54 @@ def triangulate(mesh: Mesh) -> Triangles:
     )
 
 
-def _takes_second_diagonal(p: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """True for each quad (Q, 4, 3) that is better cut from corner 1 to 3 than from 0 to 2."""
-    across, along = p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]
-    normal = np.cross(across, along)
-
-    def worst(i: int, j: int, k: int, l: int, m: int, n: int) -> NDArray[np.float64]:
-        one = np.cross(p[:, j] - p[:, i], p[:, k] - p[:, i])
-        two = np.cross(p[:, m] - p[:, l], p[:, n] - p[:, l])
-        return np.minimum(np.einsum("qi,qi->q", one, normal), np.einsum("qi,qi->q", two, normal))
-
-    first, second = worst(0, 1, 2, 0, 2, 3), worst(0, 1, 3, 1, 2, 3)
-    length_first = np.einsum("qi,qi->q", across, across)
-    length_second = np.einsum("qi,qi->q", along, along)
-    both = (first > 0) & (second > 0)
-    return np.where(both, length_second < SAME_LENGTH * length_first, second > np.maximum(first, 0.0))
-
-
 _points = types.Array(types.float32, 2, "C", readonly=True)
 _ints = types.Array(types.int32, 1, "C", readonly=True)
 _longs = types.Array(types.int64, 1, "C", readonly=True)
+
+
+@njit(
+    types.void(_points, _ints, _longs, _longs, _longs, types.Array(types.int32, 2, "C")), cache=True, nogil=True
+)
+def _cut_quads(points, corners, starts, first, faces, out):  # type: ignore[no-untyped-def]
+    """Two triangles for each quad, cut from corner 0 to 2 or, where that is better, from 1 to 3."""
+    p = np.empty((4, 3), np.float64)
+    across, along = np.empty(3, np.float64), np.empty(3, np.float64)
+    worst = np.empty(2, np.float64)  # of each cut, how much the triangle facing the quad's way least does so
+    for face in faces:
+        start = starts[face]
+        for i in range(4):
+            for axis in range(3):
+                p[i, axis] = points[corners[start + i], axis]
+        for axis in range(3):
+            across[axis] = p[2, axis] - p[0, axis]
+            along[axis] = p[3, axis] - p[1, axis]
+        nx = across[1] * along[2] - across[2] * along[1]
+        ny = across[2] * along[0] - across[0] * along[2]
+        nz = across[0] * along[1] - across[1] * along[0]
+        for cut in range(2):
+            worst[cut] = np.inf
+            for half in range(2):
+                i, j, k = cut, cut + 1, cut + 2
+                if half == 1:
+                    i, j, k = cut, cut + 2, (cut + 3) % 4
+                k %= 4
+                ax, ay, az = p[j % 4, 0] - p[i, 0], p[j % 4, 1] - p[i, 1], p[j % 4, 2] - p[i, 2]
+                bx, by, bz = p[k, 0] - p[i, 0], p[k, 1] - p[i, 1], p[k, 2] - p[i, 2]
+                facing = (ay * bz - az * by) * nx + (az * bx - ax * bz) * ny + (ax * by - ay * bx) * nz
+                worst[cut] = min(worst[cut], facing)
+        length_first = across[0] ** 2 + across[1] ** 2 + across[2] ** 2
+        length_second = along[0] ** 2 + along[1] ** 2 + along[2] ** 2
+        if worst[0] > 0.0 and worst[1] > 0.0:
+            second = length_second < SAME_LENGTH * length_first
+        else:
+            second = worst[1] > max(worst[0], 0.0)
+        row = first[face]
+        if second:
+            out[row, 0], out[row, 1], out[row, 2] = start, start + 1, start + 3
+            out[row + 1, 0], out[row + 1, 1], out[row + 1, 2] = start + 1, start + 2, start + 3
+        else:
+            out[row, 0], out[row, 1], out[row, 2] = start, start + 1, start + 2
+            out[row + 1, 0], out[row + 1, 1], out[row + 1, 2] = start, start + 2, start + 3
 
 
 @njit(
