@@ -12,7 +12,6 @@ import os
 import sys
 import traceback
 
-import click
 import typer
 
 from core.errors import UserError
@@ -21,8 +20,12 @@ from core.errors import UserError
 COMMANDS = ("groom", "convert", "info", "check", "render", "run", "bench", "doctor", "demo")
 
 
-def build() -> typer.Typer:
-    """The typer application with every command."""
+# typer carries a click of its own; this is its base class of everything said wrongly on the command line
+UsageError = typer.BadParameter.__base__
+
+
+def build(names: tuple[str, ...] = COMMANDS) -> typer.Typer:
+    """The typer application with these commands; a command's module is only loaded when it is named."""
     cli = typer.Typer(
         name="filoplume",
         help="Groom hair on real animals, from the command line. Documents, meshes and coats in; coats and pictures out.",
@@ -31,7 +34,7 @@ def build() -> typer.Typer:
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for name in COMMANDS:
+    for name in names:
         module = importlib.import_module(f"app.commands.{name}")
         cli.command(name, no_args_is_help=name not in ("bench", "doctor", "demo"))(module.command)
     return cli
@@ -42,18 +45,15 @@ def main(arguments: list[str] | None = None) -> None:
     arguments = sys.argv[1:] if arguments is None else arguments
     as_json = "--json" in arguments
     try:
-        code = typer.main.get_command(build())(args=arguments, prog_name="filoplume", standalone_mode=False) or 0
-    except click.exceptions.NoArgsIsHelpError as error:
-        error.show()
-        code = 2
-    except click.UsageError as error:
+        code = _run(arguments)
+    except UsageError as error:
         if as_json:
             print(json.dumps({"error": error.format_message()}))
         error.show()
         code = 2
-    except click.exceptions.Exit as error:
+    except typer.Exit as error:
         code = error.exit_code
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         code = _fail("stopped; nothing half-written was left", as_json, 130)
     except UserError as error:
         code = _fail(str(error), as_json, 1)
@@ -75,6 +75,14 @@ def main(arguments: list[str] | None = None) -> None:
             "FILOPLUME_DEBUG=1 shows the whole trace", as_json, 1,
         )
     raise SystemExit(code)
+
+
+def _run(arguments: list[str]) -> int:
+    chosen = next((a for a in arguments if not a.startswith("-")), None)
+    # one command alone would lose its name, so a second, light one stands beside it
+    names = tuple(dict.fromkeys((chosen, "run"))) if chosen in COMMANDS else COMMANDS
+    command = typer.main.get_command(build(names if len(names) > 1 else ("run", "bench")))
+    return command(args=arguments, prog_name="filoplume", standalone_mode=False) or 0
 
 
 def _fail(sentence: str, as_json: bool, code: int) -> int:

@@ -124,7 +124,10 @@ def test_a_density_map_keeps_hair_off_the_black_half(tmp_path):
     assert done.returncode == 0, done.stderr
     hairs = read_groom(tmp_path / "half.usdc").children
     assert len(hairs) == 1000
-    assert hairs.root_uvs[:, 0].min() > 38 / 64
+    u = hairs.root_uvs[:, 0]
+    # half a texel of blending at the edge of the white, and at the seam, where the image repeats
+    assert ((u > 39.5 / 64) | (u < 0.5 / 64)).all()
+    assert (u > 41 / 64).mean() > 0.9
 
 
 def test_info_and_check_tell_what_is_there(groomed):
@@ -217,6 +220,6 @@ def test_a_script_that_fails_names_its_line(tmp_path):
 
 
 def test_the_command_line_never_loads_qt():
-    code = "import sys, app.cli; app.cli.build(); print([m for m in sys.modules if 'PySide' in m or 'PyQt' in m])"
+    code = "import sys, app.cli; app.cli.build(app.cli.COMMANDS); print([m for m in sys.modules if 'PySide' in m or 'PyQt' in m])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout.strip() == "[]"
