@@ -121,6 +121,16 @@ def test_every_operation_may_fail(target, monkeypatch, error, keep):
     assert not any(late[:-2])
 
 
+def test_the_contents_are_on_the_disk_before_the_name_and_the_name_before_the_end(target, monkeypatch):
+    """Power may go at any moment: what is renamed must have been synced, and the folder after it."""
+    with failing(Disk(target.parent), monkeypatch) as disk:
+        _write(target)
+    renamed = disk.calls.index("replace")
+    assert "fsync" in disk.calls[disk.calls.index("write") : renamed]
+    assert "write" not in disk.calls[renamed:]
+    assert disk.calls[-1] == "fsync"
+
+
 @pytest.mark.parametrize(
     ("error", "advice"),
     [(errno.ENOSPC, "free some space"), (errno.EROFS, "another folder"), (errno.EIO, "another folder")],

@@ -298,3 +298,18 @@ def test_hashes_are_shared_with_the_project(tmp_path):
     assert hashes.of(points) in _current(journal).read_bytes().decode("latin1")
     assert msgspec.json.encode(hashes.of(points))
     journal.close(remove=True)
+
+
+def test_every_commit_is_synced_and_a_new_generation_before_it_gets_its_name(tmp_path, monkeypatch):
+    journal = Journal(tmp_path, generation_bytes=0)
+    with failing(Disk(tmp_path), monkeypatch) as disk:
+        states = _strokes(journal, 3, small_document(guides=500))
+        first = disk.calls.index("replace")
+        assert "fsync" in disk.calls[disk.calls.index("write") : first]
+        assert disk.calls[first + 1] == "fsync"
+        del disk.calls[:]
+        journal.commit(stroked(states[-1], 9), Workspace())
+        journal.flush()
+        assert disk.calls.count("fsync") == 1  # one for a commit
+        assert disk.calls[-1] == "fsync"
+    journal.close(remove=True)
