@@ -212,12 +212,15 @@ class SurfaceSites:
         loop = skin.vertices - len(skin.loops)
         phantom = (mesh >= loop) & ~np.concatenate([np.zeros(loop, bool), skin.filled])
         self._kind[: skin.vertices][phantom] = PHANTOM
-        site_piece = skin.component[self._net_vertex(site_face)]
+        placed = site_face >= 0  # all of them, unless every triangle is degenerate
+        site_piece = skin.component[self._net_vertex(site_face[placed])]
         sites = np.bincount(site_piece, minlength=skin.components)
         stay = sites + np.bincount(skin.component[phantom], minlength=skin.components)
         self._sites_on = sites
-        self._piece[self._vertex] = site_piece
-        order = mesh[np.argsort(rand(mesh, self._seed), kind="stable")]
+        self._piece[self._vertex[placed]] = site_piece
+        # flat vertices first: taking them out is exact, and what curvature there is then moves no further than needed
+        curved = np.abs(_angle_defect(skin)) > 1e-9
+        order = mesh[np.argsort(rand(mesh, self._seed) + curved, kind="stable")]
         order = order[~phantom[order]]
         piece = skin.component[order]
         few = np.flatnonzero((stay < FEWEST) | (sites == 0))
@@ -249,6 +252,8 @@ class SurfaceSites:
         self._site_bary = np.concatenate([self._site_bary, bary])
         self._nearest_site = None
         face, weights = self._on_skin(tri, bary)
+        if face[0] < 0:
+            return self._rebuild()
         piece = int(self._skin.component[self._net_vertex(face)[0]])
         if self._sites_on[piece] == 0:
             return self._rebuild()
@@ -281,7 +286,7 @@ class SurfaceSites:
         self._site_bary = np.delete(self._site_bary, row, axis=0)
         self._nearest_site = None
         piece = int(self._piece[v])
-        if self._sites_on[piece] == 1:
+        if self._net.first[v] < 0 or self._sites_on[piece] == 1:
             return self._rebuild()
         self._label[self._label > row] -= 1
         self._sites_on[piece] -= 1
@@ -367,6 +372,15 @@ class SurfaceSites:
         if len(lost):
             sites[lost] = self._nearest(rows[lost])[:, None]
         return Rebound(rows[:found].copy(), sites[:found].copy(), weights[:found].copy())
+
+
+def _angle_defect(skin: Manifold) -> NDArray[np.float64]:
+    """2 pi less the angles around each vertex, (vertices,)."""
+    a = skin.length.reshape(-1, 3)
+    b, c = np.roll(a, -1, axis=1), np.roll(a, -2, axis=1)  # the side across from each corner is b
+    four = np.sqrt(np.maximum((a + b + c) * (b + c - a) * (c + a - b) * (a + b - c), 0.0))
+    angle = np.arctan2(four, a * a + c * c - b * b)
+    return 2.0 * np.pi - np.bincount(skin.origin, angle.ravel(), minlength=skin.vertices)
 
 
 def _surface_area(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> float:

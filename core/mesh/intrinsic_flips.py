@@ -55,7 +55,7 @@ NET: Any = types.NamedTuple(  # type: ignore[no-untyped-call]
 )
 
 FREE, TOUCHED, WAITING, FLIPS = 0, 1, 2, 3
-CLAMP = 1e-4  # a new vertex keeps this share of its triangle from every edge
+CLAMP = 2e-5  # a new vertex keeps this share of its triangle from every edge
 
 
 @njit(types.float64(types.float64, types.float64, types.float64), cache=True, nogil=True)

@@ -203,41 +203,47 @@ def _place(ring, d, scale):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(RING, types.int64), cache=True, nogil=True)
 def _place_unflattened(ring, d):  # type: ignore[no-untyped-def]
-    """Lay out a star that cannot be made flat, sharing its angles out; False when one would be too wide."""
-    total = 0.0
+    """Lay out a star that cannot be made flat, sharing its angles out; False when two would be too wide."""
+    total, wide = 0.0, 0
     for i in range(d):
         j = i + 1 if i + 1 < d else 0
         a, b, c = ring.inner[i], ring.inner[j], ring.outer[i]
         ring.span[i] = max(1e-3, atan2(4.0 * area(a, b, c), a * a + b * b - c * c))
         total += ring.span[i]
-    for i in range(d):
-        if ring.span[i] * 2.0 * pi > 0.98 * pi * total:
-            return False
+        if ring.span[i] > ring.span[wide]:
+            wide = i
+    widest = 0.95 * pi
+    if ring.span[wide] * 2.0 * pi > widest * total:  # the vertex would lie outside its ring
+        rest = total - ring.span[wide]
+        for i in range(d):
+            ring.span[i] = widest if i == wide else ring.span[i] * (2.0 * pi - widest) / rest
+            if ring.span[i] > widest:
+                return False
     _place(ring, d, 1.0)
     return True
 
 
-@njit(types.float64(RING, types.int64, types.int64, types.int64), cache=True, nogil=True)
-def _lift(ring, i, j, k):  # type: ignore[no-untyped-def]
-    """Height over the vertex of the plane of ear i, j, k on the paraboloid; infinite where it is not convex."""
+@njit(types.float64(RING, types.int64, types.int64, types.int64, types.float64), cache=True, nogil=True)
+def _lift(ring, i, j, k, sliver):  # type: ignore[no-untyped-def]
+    """Height over the vertex of the plane of ear i, j, k on the paraboloid; infinite where thinner than `sliver`."""
     ax, ay, bx, by, cx, cy = ring.x[i], ring.y[i], ring.x[j], ring.y[j], ring.x[k], ring.y[k]
     e = (bx - ax) ** 2 + (by - ay) ** 2 + (cx - bx) ** 2 + (cy - by) ** 2
     turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    if turn <= 1e-8 * e:
+    if turn <= sliver * e:
         return np.inf
     up = (ax * ax + ay * ay) * (bx * cy - by * cx) - (bx * bx + by * by) * (ax * cy - ay * cx)
     up += (cx * cx + cy * cy) * (ax * by - ay * bx)
     return up / turn
 
 
-@njit(types.boolean(RING, types.int64), cache=True, nogil=True)
-def _fill(ring, d):  # type: ignore[no-untyped-def]
+@njit(types.boolean(RING, types.int64, types.float64), cache=True, nogil=True)
+def _fill(ring, d, sliver):  # type: ignore[no-untyped-def]
     """Triangulate the ring polygon into ``ring.corner``; False when no positive triangulation is found."""
     for i in range(d):
         ring.after[i] = i + 1 if i + 1 < d else 0
         ring.before[i] = i - 1 if i > 0 else d - 1
     for i in range(d):
-        ring.lift[i] = _lift(ring, ring.before[i], i, ring.after[i])
+        ring.lift[i] = _lift(ring, ring.before[i], i, ring.after[i], sliver)
     at = 0
     for n in range(d - 3):
         best = -1
@@ -252,12 +258,12 @@ def _fill(ring, d):  # type: ignore[no-untyped-def]
         ring.corner[n, 0], ring.corner[n, 1], ring.corner[n, 2] = a, best, c
         ring.after[a] = c
         ring.before[c] = a
-        ring.lift[a] = _lift(ring, ring.before[a], a, c)
-        ring.lift[c] = _lift(ring, a, c, ring.after[c])
+        ring.lift[a] = _lift(ring, ring.before[a], a, c, sliver)
+        ring.lift[c] = _lift(ring, a, c, ring.after[c], sliver)
         at = a
     a, c = ring.before[at], ring.after[at]
     ring.corner[d - 3, 0], ring.corner[d - 3, 1], ring.corner[d - 3, 2] = a, at, c
-    return _lift(ring, a, at, c) < np.inf
+    return _lift(ring, a, at, c, sliver) < np.inf
 
 
 @njit(types.boolean(RING, types.int64), cache=True, nogil=True)
@@ -393,7 +399,8 @@ def remove_vertex(net, ring, v, point, cap, forgiving):  # type: ignore[no-untyp
             _place(ring, d, scale)
         else:
             done = forgiving and _place_unflattened(ring, d)
-        done = done and _fill(ring, d) and _closes(ring, d)
+        # lengths cannot tell the height of a thin triangle: 1e-16 of them is 1e-12 of it at 1e-4
+        done = done and (_fill(ring, d, 1e-4) or (forgiving and _fill(ring, d, 1e-8))) and _closes(ring, d)
     if done:
         _move_points(net, ring, d, point)
         _rewire(net, ring, d)
