@@ -163,7 +163,6 @@ def mesh_info(path: str | Path) -> dict[str, Any]:
     """
     found = read_mesh(path)
     mesh = found.mesh
-    used = mesh.points[mesh.corners]
     return {
         "kind": "mesh",
         "format": _format_of(Path(path)).name,
@@ -178,7 +177,7 @@ def mesh_info(path: str | Path) -> dict[str, Any]:
         "closed": found.closed,
         "unit": found.metres_per_unit if found.unit_source == "file" else None,
         "up": found.up,
-        "size": [round(float(x), 9) for x in used.max(axis=0) - used.min(axis=0)],
+        "size": [round(x, 9) for x in _size(mesh)],
         "problems": found.problems,
     }
 
@@ -260,13 +259,19 @@ def _space_notes(name: str, space: _Space, mesh: Mesh) -> list[str]:
     assumed = [row for row in missing if row[0] == "assumed"]
     if not assumed:
         return []
-    used = mesh.points[mesh.corners]
-    x, y, z = (used.max(axis=0) - used.min(axis=0)).tolist()
+    x, y, z = _size(mesh)
     words, lacks, options = (" and ".join(row[i] for row in assumed) for i in (1, 2, 3))
     return [
         f"{name} does not say {lacks.replace(' and ', ' or ')}: {words} assumed, "
         f"which makes it {x:.3g} x {y:.3g} x {z:.3g} m; set {options} to change that."
     ]
+
+
+def _size(mesh: Mesh) -> list[float]:
+    """Width, height and depth of the box around the faces, metres; vertices no face uses do not count."""
+    used = np.zeros(len(mesh.points), np.bool_)
+    used[mesh.corners] = True
+    return list((mesh.points[used].max(axis=0) - mesh.points[used].min(axis=0)).tolist())
 
 
 def _problem_notes(name: str, repaired: Repaired) -> list[str]:
