@@ -11,7 +11,7 @@ from core.groom.children import Children
 from core.groom.groom import Coat as CoatRecord
 from core.groom.strands import GroomStrands, Strands
 from core.mesh.skin import Skin
-from viewport.scene import Coat, GuideLines, Look, Scene, Surface, skin_under
+from viewport.scene import Coat, Color, GuideLines, Look, Scene, Surface
 
 SKIN = (0.36, 0.35, 0.34)
 DRAWN_POINTS = 16
@@ -23,7 +23,7 @@ def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[in
     surfaces = tuple(
         Surface(
             skins[item.id].points, skins[item.id].normals, skins[item.id].triangles.vertices,
-            skin_under(coats[item.id]) if item.id in coats else SKIN,
+            skin_of(coats[item.id]) if item.id in coats else SKIN,
         )
         for item in document.meshes
         if not item.hidden
@@ -34,6 +34,12 @@ def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[in
         if g.id in children and len(children[g.id])
     )
     return Scene(surfaces, hair)
+
+
+def skin_of(look: Look) -> Color:
+    """The colour of skin under a coat: near that of the roots, a little of the tips for where hair is short."""
+    r, g, b = (0.7 * (0.75 * root + 0.25 * tip) for root, tip in zip(look.root, look.tip, strict=True))
+    return (r, g, b)
 
 
 def look_of(coat: CoatRecord) -> Look:

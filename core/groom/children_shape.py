@@ -12,6 +12,7 @@ from core.groom.children_kernels import F1, F2, F3, I1, I2, I8, OUT_F3
 from core.random import hash32, rand, rand1
 
 WAVES = 64  # different frizz curves; each child takes two
+CLUMP_REACH = 0.35  # at this distance from its guide, as a share of its length, a child closes up half as far
 REACH = 0.12  # largest frizz at the tip, as a share of the child's length, at frizz 1
 
 
@@ -48,7 +49,7 @@ def shape_children(  # type: ignore[no-untyped-def]
     guides : (G, 4, P) prepared guides. guide_roots : (G, 3) where they stand.
     profile : (P,). waves : (WAVES, P).
     normals : (G, 3) of the guides: frizz is square to the strongest guide's, so that it lowers no hair onto the skin.
-    clump, frizz : 0 .. 1.
+    clump, frizz : 0 .. 1. A child far from its guide, for its length, closes up less.
     """
     count = out.shape[2]
     last = np.float32(count - 1)
@@ -58,12 +59,18 @@ def shape_children(  # type: ignore[no-untyped-def]
         w2 = np.float32(1.0) - w0 - w1
         s = sites[r, 0] if w0 >= w1 and w0 >= w2 else (sites[r, 1] if w1 >= w2 else sites[r, 2])
         if clump > 0.0:
+            far, reach = np.float32(0.0), np.float32(1e-30)
+            for c in range(3):
+                far += (out[r, c, 0] - guide_roots[s, c]) ** 2
+                reach += (out[r, c, count - 1] - out[r, c, 0]) ** 2
+            # short hair does not reach over to a far guide: without this, faces and paws grow scales
+            near = np.float32(1.0) / (np.float32(1.0) + far / (np.float32(CLUMP_REACH * CLUMP_REACH) * reach))
             for j in range(1, count):
                 at = min(np.float32(j) * length[r], last)
                 k = min(np.int64(at), count - 2)
                 b = at - np.float32(k)
                 a = np.float32(1.0) - b
-                m = clump * profile[j]
+                m = clump * near * profile[j]
                 for c in range(3):
                     goal = guide_roots[s, c] + a * guides[s, c, k] + b * guides[s, c, k + 1]
                     out[r, c, j] += m * (goal - out[r, c, j])

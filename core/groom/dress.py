@@ -20,6 +20,7 @@ from core.mesh.skin import Skin, distance_field, skin_at_rest
 from core.mesh.surface import place_roots, root_positions
 from core.record import freeze
 
+THICKEST = 1e3  # metres; only meshes in absurd units get there
 Stage = Callable[[str], AbstractContextManager[None]]
 
 
@@ -72,7 +73,8 @@ def dress(
         )
         laid = push_out(laid, field, ranges=evaluator.workers.ranges)
     coat = Coat(
-        count=hairs, seed=seed, width_root=style.width_root * skin.diagonal, width_tip=style.width_tip * skin.diagonal,
+        count=hairs, seed=seed, width_root=min(style.width_root * skin.diagonal, THICKEST),
+        width_tip=min(style.width_tip * skin.diagonal, THICKEST),
         color_root=style.color_root, color_tip=style.color_tip, clump=style.clump, frizz=style.frizz,
         length_variation=style.length_variation, density_map=density_map, length_map=length_map,
     )

@@ -65,7 +65,10 @@ def grow(
         update_roots(children, skin.points, skin.normals)
         evaluate(children, points, normals, workers, shape=Shape(coat.clump, coat.frizz, coat.seed))
     with stage("settle"):
-        field = build_distance_field(skin.points, skin.triangles.vertices) if posed else distance_field(mesh, evaluator)
+        field = (
+            build_distance_field(skin.points, skin.triangles.vertices, workers=workers)
+            if posed else distance_field(mesh, evaluator)
+        )
         settle(children.points, field, workers=workers)
         if is_closed(mesh):
             signed = signed_skin(mesh, evaluator) if not posed else build_signed_skin(skin.points, skin.triangles.vertices)

@@ -16,6 +16,7 @@ from core.mesh.roots import Roots
 from core.mesh.signed_distance import SignedSkin, build_signed_skin
 from core.mesh.surface import root_positions
 from core.mesh.triangulate import triangulate
+from core.workers import Workers
 
 
 class Skin(NamedTuple):
@@ -50,7 +51,7 @@ def skin_posed(mesh: Mesh, points: np.ndarray, evaluator: Evaluator) -> Skin:
 
 def distance_field(mesh: Mesh, evaluator: Evaluator) -> DistanceField:
     """The distance field of the mesh at rest, remembered by the evaluator."""
-    return evaluator.get(_field, mesh)
+    return evaluator.get(_field, mesh, workers=evaluator.workers)
 
 
 def signed_skin(mesh: Mesh, evaluator: Evaluator) -> SignedSkin:
@@ -66,8 +67,8 @@ def _rest(mesh: Mesh) -> Skin:
     )
 
 
-def _field(mesh: Mesh) -> DistanceField:
-    return build_distance_field(mesh.points, triangulate(mesh).vertices)
+def _field(mesh: Mesh, workers: Workers) -> DistanceField:
+    return build_distance_field(mesh.points, triangulate(mesh).vertices, workers=workers)
 
 
 def _signed(mesh: Mesh) -> SignedSkin:
