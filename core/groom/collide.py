@@ -24,6 +24,7 @@ F64_1D = types.Array(types.float64, 1, "C", readonly=True)
 NO_FIELD = DistanceField(freeze(np.zeros(3)), 1.0, 0.0, freeze(np.zeros((0, 0, 0), np.float32)))
 REPEATS = 4
 ESCAPES = 5
+MARGIN = 0.25  # of a cell: by so much a grid may read a convex edge too far out
 LEAST_GRADIENT = 0.3  # a distance grows by 1 per metre; less is the flat rest beyond the band, or a ridge
 
 
@@ -34,13 +35,15 @@ def collide_chain(x, q, lengths, first, values, origin, cell, clearance, move): 
     Each segment is sampled at its end and between, at most a cell of the grid apart, unless both ends are so far out
     that nothing between can touch. The sample that asks for most raises the direction of the segment along its normal;
     what lies beyond is carried. Distances are read relative to that of the root, which lies on the skin where the
-    grid has an error there; the correction fades over four cells. Clearance grows over the first segment.
+    grid has an error there; the correction fades over two cells, over which a margin for its other errors grows.
+    Clearance grows over the first segment.
     With `move` False nothing is changed, only measured.
     """
     count = lengths.shape[0]
     at_root = sample_field(values, origin, cell, x[0, 0], x[0, 1], x[0, 2])
     at_root = min(max(at_root, -2.0 * cell), 2.0 * cell)
-    fade = 0.25 / cell
+    fade = 0.5 / cell
+    margin = MARGIN * cell
     arc = 0.0
     for j in range(first):
         arc += lengths[j]
@@ -67,13 +70,13 @@ def collide_chain(x, q, lengths, first, values, origin, cell, clearance, move): 
                     values, origin, cell,
                     x[j, 0] + t * length * q[j, 0], x[j, 1] + t * length * q[j, 1], x[j, 2] + t * length * q[j, 2],
                 ) - at_root * max(0.0, 1.0 - s * fade)
-                need = clearance * min(1.0, s / ramp)
+                need = clearance * min(1.0, s / ramp) + margin * min(1.0, s * fade)
                 here = min(here, d)
                 if (need - d) / t > worst:
                     worst, worst_t = (need - d) / t, t
                 if piece == pieces:
                     at_end = d
-                    if before + d > length + 2.0 * clearance:
+                    if before + d > length + 2.0 * (clearance + margin):
                         break
             if worst <= 1e-6 * length or repeat == REPEATS + ESCAPES or not move:
                 break

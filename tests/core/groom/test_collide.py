@@ -37,7 +37,8 @@ def test_a_strand_pushed_into_a_plane_lies_on_it():
     g = strand(np.stack([0.6 * s, 0 * s, -0.8 * s], axis=1))
     out = push_out(g, plane(), clearance=0.01)
     x = out.points[0].astype(np.float64)
-    assert np.allclose(x[1:, 2], 0.01, atol=2e-3)
+    assert np.allclose(x[2:, 2], 0.01 + 0.25 * 0.1, atol=3e-3)  # clearance, and a quarter of a cell for the grid
+    assert x[1, 2] > 0.01
     assert np.allclose(x[1:, 1], 0)
     assert np.allclose(segment_lengths(out), 0.1, atol=1e-6)
     assert x[-1, 0] > 0.99  # it kept its way along the plane
@@ -89,7 +90,7 @@ def test_tangled_hair_comes_out_of_a_ball(seed):
         free &= before.selected
     x = after.points[free].astype(np.float64)
     samples = np.concatenate([x[:, 1:] * t + x[:, :-1] * (1 - t) for t in (0.25, 0.5, 0.75, 1.0)], axis=1)
-    assert radial_depth(ball(), samples).max(initial=-1) < 0.15 * ball().field.cell
+    assert radial_depth(ball(), samples).max(initial=-1) < 0.02 * ball().field.cell
 
 
 def test_roots_on_a_coarse_grid_do_not_stand_hair_on_end():

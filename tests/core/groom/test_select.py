@@ -1,13 +1,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 import trimesh
 
 from core.evaluator import Evaluator
 from core.groom.commands import skin_context
-from core.groom.delete import delete
-from core.groom.freeze import freeze, freeze_others, unfreeze
 from core.groom.plant import plant_scatter
 from core.groom.rows import no_guides
 from core.groom.select import (
@@ -22,7 +19,7 @@ from core.groom.select import (
     select_none,
     select_with_ring,
 )
-from tests.core.groom.small_grooms import fur, mesh_of, mixed, view
+from tests.core.groom.small_grooms import fur, mesh_of, view
 
 
 def flags(*rows):
@@ -92,33 +89,3 @@ def test_islands_are_the_connected_pieces_of_the_mesh():
     picked = select(g, np.arange(30) == np.flatnonzero(on_box)[0])
     assert np.array_equal(select_islands(picked, mesh).selected, on_box)
     assert select_islands(g, mesh) is g
-
-
-def test_freezing_and_thawing():
-    g = fur().replace(selected=flags(1, 2))
-    cold = freeze(g)
-    assert np.array_equal(cold.frozen, flags(1, 2))
-    assert not cold.selected.any()
-    assert np.array_equal(freeze_others(g).frozen, ~flags(1, 2))
-    assert np.array_equal(freeze_others(g).selected, flags(1, 2))
-    assert np.array_equal(unfreeze(cold, flags(1)).frozen, flags(2))
-    assert not unfreeze(cold).frozen.any()
-    assert unfreeze(g) is g
-    assert freeze(cold) is cold
-    assert cold.points is g.points
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_deleting_spares_the_frozen_the_held_and_the_unselected(seed):
-    before = mixed(seed)
-    mask = np.random.default_rng(seed).random(60) < 0.5
-    after = delete(before, mask)
-    stay = ~mask | before.frozen | (before.hold.max(axis=1) >= 1)
-    if before.selected.any():
-        stay |= ~before.selected
-    assert np.array_equal(after.ids, before.ids[stay])
-    assert np.array_equal(after.points, before.points[stay])
-    assert np.array_equal(after.hold, before.hold[stay])
-    assert np.array_equal(after.roots.weights, before.roots.weights[stay])
-    assert after.next_id == before.next_id
-    assert delete(before, ~np.ones(60, bool)) is before

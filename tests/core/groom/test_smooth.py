@@ -90,7 +90,7 @@ def test_smoothing_over_the_skin_stays_out_of_it():
     out = smooth(g, along=1.0, iterations=30, field=context.field)
     x = out.points.astype(np.float64)
     samples = np.concatenate([x[:, 1:] * t + x[:, :-1] * (1 - t) for t in (0.25, 0.5, 0.75, 1.0)], axis=1)
-    assert radial_depth(context, samples).max() < 0.15 * context.field.cell
+    assert radial_depth(context, samples).max() < 0.02 * context.field.cell
     assert radial_depth(context, smooth(g, along=1.0, iterations=30).points[:, 1:]).max() > 0.01
 
 
