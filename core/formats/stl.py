@@ -94,6 +94,11 @@ def _read_vertices(data, powers, points):  # type: ignore[no-untyped-def]
         start = at
         while at < size and data[at] > 32:
             at += 1
+        last = at - start - 1
+        if (last == 4 or last == 7) and data[start + last] | 32 == 100 and data[start + last - 4] | 32 == 115:
+            while at < size and data[at] != 10 and data[at] != 13:  # "solid" and "endsolid" are followed by a name
+                at += 1
+            continue
         is_vertex = (
             at - start == 6 and data[start] | 32 == 118 and data[start + 1] | 32 == 101 and data[start + 2] | 32 == 114
             and data[start + 3] | 32 == 116 and data[start + 4] | 32 == 101 and data[start + 5] | 32 == 120
