@@ -17,10 +17,11 @@ from numba import njit, types
 from numpy.typing import NDArray
 
 from core.mesh.bvh_build import build_tree, gather_corners, refit_boxes
-from core.mesh.bvh_kernels import any_hit_segment, closest_on_triangle, closest_one, new_stack, ray_one
+from core.mesh.bvh_kernels import LANES, any_hit_segment, closest_on_triangle, closest_one, new_stack, ray_one
 from core.workers import Workers, serial_ranges
 
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
+F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 I32_1D = types.Array(types.int32, 1, "C", readonly=True)
 I32_2D = types.Array(types.int32, 2, "C", readonly=True)
 
@@ -34,9 +35,10 @@ class Bvh(NamedTuple):
     """A hierarchy over T triangles, M nodes.
 
     boxes : (M, 12) float32, low xyz and high xyz of the first child, then of the second.
-    children : (M, 2) int32, >= 0 another node, else ``~(first slot * 8 + count)`` of a leaf.
-    order : (T,) int32, the triangle in each slot.
-    corners : (T, 9) float32, the three points of the triangle in each slot.
+    children : (M, 2) int32, >= 0 another node, else ``~(leaf * 16 + count)``; the slots of a leaf begin at leaf * 8.
+    order : (S,) int32, the triangle in each slot, -1 in an empty one.
+    corners : (S, 9) float32, the three points of the triangle in each slot.
+    blocks : (S / 8, 9, 8) float32, the same numbers a leaf at a time, for tests of 8 triangles at once.
     triangles : (T, 3) int32, vertices of each triangle (as given).
     """
 
@@ -44,6 +46,7 @@ class Bvh(NamedTuple):
     children: NDArray[np.int32]
     order: NDArray[np.int32]
     corners: NDArray[np.float32]
+    blocks: NDArray[np.float32]
     triangles: NDArray[np.int32]
 
 
@@ -54,23 +57,29 @@ def build_bvh(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> Bvh:
     """
     points = np.ascontiguousarray(points, np.float32)
     triangles = np.ascontiguousarray(triangles, np.int32)
-    count = len(triangles)
-    order = np.arange(count, dtype=np.int32)
-    boxes = np.empty((max(1, count), 12), np.float32)
-    children = np.empty((max(1, count), 2), np.int32)
-    nodes = build_tree(points, triangles, order, boxes, children)
-    corners = np.empty((count, 9), np.float32)
-    gather_corners(points, triangles, order, corners)
-    return Bvh(boxes[:nodes].copy(), children[:nodes].copy(), order, corners, triangles)
+    room = max(1, len(triangles))
+    boxes = np.empty((room, 12), np.float32)
+    children = np.empty((room, 2), np.int32)
+    nodes, order = build_tree(points, triangles, boxes, children)
+    corners, blocks = _gathered(points, triangles, order)
+    return Bvh(boxes[:nodes].copy(), children[:nodes].copy(), order, corners, blocks, triangles)
+
+
+def _gathered(
+    points: NDArray[np.float32], triangles: NDArray[np.int32], order: NDArray[np.int32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    corners = np.empty((len(order), 9), np.float32)
+    blocks = np.empty((len(order) // LANES, 9, LANES), np.float32)
+    gather_corners(points, triangles, order, corners, blocks)
+    return corners, blocks
 
 
 def refit(bvh: Bvh, points: NDArray[np.float32]) -> Bvh:
     """The same tree around moved `points` (V, 3) float32: quick, and good while the skin keeps its general shape."""
-    corners = np.empty_like(bvh.corners)
-    gather_corners(np.ascontiguousarray(points, np.float32), bvh.triangles, bvh.order, corners)
+    corners, blocks = _gathered(np.ascontiguousarray(points, np.float32), bvh.triangles, bvh.order)
     boxes = np.empty_like(bvh.boxes)
     refit_boxes(bvh.children, corners, boxes)
-    return bvh._replace(corners=corners, boxes=boxes)
+    return bvh._replace(corners=corners, blocks=blocks, boxes=boxes)
 
 
 def closest_points(
@@ -92,7 +101,7 @@ def closest_points(
 
     def rows(start: int, stop: int) -> None:
         _closest_rows(
-            bvh.boxes, bvh.children, bvh.order, bvh.corners, queries, float(max_distance),
+            bvh.boxes, bvh.children, bvh.order, bvh.corners, bvh.blocks, queries, float(max_distance),
             triangle, barycentric, distance, start, stop,
         )
 
@@ -158,19 +167,19 @@ def _ranges(workers: Workers | None) -> Callable[..., None]:
 
 @njit(
     types.void(
-        F32_2D, I32_2D, I32_1D, F32_2D, F32_2D, types.float64,
+        F32_2D, I32_2D, I32_1D, F32_2D, F32_3D, F32_2D, types.float64,
         types.int32[::1], types.float32[:, ::1], types.float32[::1], types.int64, types.int64,
     ),
     cache=True, nogil=True,
 )
 def _closest_rows(  # type: ignore[no-untyped-def]
-    boxes, children, order, corners, queries, max_distance, triangle, barycentric, distance, start, stop
+    boxes, children, order, corners, blocks, queries, max_distance, triangle, barycentric, distance, start, stop
 ):
     stack, keys = new_stack()
     limit2 = max_distance * max_distance * (1.0 + 1e-12)  # a point exactly at the limit is within it
     for i in range(start, stop):
         x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
-        slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, x, y, z, limit2, stack, keys)
+        slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, blocks, x, y, z, limit2, stack, keys)
         triangle[i] = order[slot] if slot >= 0 else -1
         barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = b0, b1, b2
         distance[i] = math.sqrt(d2) if slot >= 0 else np.inf

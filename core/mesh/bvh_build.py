@@ -7,25 +7,33 @@ import math
 import numpy as np
 from numba import njit, types
 
-from core.mesh.bvh_kernels import STACK_SIZE
+from core.mesh.bvh_kernels import LANES, STACK_SIZE
 
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 I32_1D = types.Array(types.int32, 1, "C", readonly=True)
 I32_2D = types.Array(types.int32, 2, "C", readonly=True)
 
-LEAF_SIZE = 4
 MAX_SAH_DEPTH = 30  # deeper nodes are halved by count, so that no tree outgrows the stack
 BINS = 16
 HUGE = np.float32(1e30)
+FAR_AWAY = np.float32(1e15)  # its square is still a float32
 
 
-@njit(types.void(F32_2D, I32_2D, I32_1D, types.float32[:, ::1]), cache=True, nogil=True)
-def gather_corners(points, triangles, order, corners):  # type: ignore[no-untyped-def]
+@njit(
+    types.void(F32_2D, I32_2D, I32_1D, types.float32[:, ::1], types.float32[:, :, ::1]), cache=True, nogil=True
+)
+def gather_corners(points, triangles, order, corners, blocks):  # type: ignore[no-untyped-def]
+    """Copy the corners of the triangle in each slot, by slot and in lanes; empty slots are not finite, or far away."""
     for s in range(len(order)):
+        total = np.float32(0.0)
         for j in range(3):
-            v = triangles[order[s], j]
             for k in range(3):
-                corners[s, 3 * j + k] = points[v, k]
+                value = points[triangles[order[s], j], k] if order[s] >= 0 else np.float32(np.nan)
+                corners[s, 3 * j + k] = value
+                total += value
+        finite = math.isfinite(total)
+        for k in range(9):
+            blocks[s // LANES, k, s % LANES] = corners[s, k] if finite else FAR_AWAY
 
 
 @njit(cache=True, inline="always")
@@ -49,9 +57,13 @@ def _grow_and_measure(box, bin_boxes, b):  # type: ignore[no-untyped-def]
     return x * y + y * z + z * x
 
 
-@njit(types.int64(F32_2D, I32_2D, types.int32[::1], types.float32[:, ::1], types.int32[:, ::1]), cache=True, nogil=True)
-def build_tree(points, triangles, order, boxes, children):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def build_tree(points, triangles, boxes, children):  # type: ignore[no-untyped-def]
+    """Fill boxes and children; returns the number of nodes and the triangle of each slot (-1: an empty lane)."""
     count = len(triangles)
+    order = np.arange(count).astype(np.int32)
+    slots = np.full(LANES * max(1, count), -1, np.int32)
+    leaves = 0
     tri_boxes = np.empty((count, 6), np.float32)
     centres = np.empty((count, 3), np.float32)
     for t in range(count):
@@ -101,8 +113,11 @@ def build_tree(points, triangles, order, boxes, children):  # type: ignore[no-un
             for k in range(6):
                 boxes[parent, 6 * side + k] = box[0, k]
         size = stop - start
-        if size <= LEAF_SIZE:
-            leaf = np.int32(~(start * 8 + size))
+        if size <= LANES:
+            leaf = np.int32(~(leaves * 2 * LANES + size))
+            for s in range(size):
+                slots[LANES * leaves + s] = order[start + s]
+            leaves += 1
             if parent >= 0:
                 children[parent, side] = leaf
             else:  # a whole mesh of one leaf: the root's second child stays empty
@@ -163,7 +178,7 @@ def build_tree(points, triangles, order, boxes, children):  # type: ignore[no-un
             todo[open_ranges, 1] = middle if which == 1 else stop
             todo[open_ranges, 2], todo[open_ranges, 3], todo[open_ranges, 4] = node, 1 - which, depth + 1
             open_ranges += 1
-    return nodes
+    return nodes, slots[: LANES * max(1, leaves)].copy()
 
 
 @njit(types.void(I32_2D, F32_2D, types.float32[:, ::1]), cache=True, nogil=True)
@@ -179,7 +194,8 @@ def refit_boxes(children, corners, boxes):  # type: ignore[no-untyped-def]
                     boxes[node, at + 3 + k] = max(boxes[child, 3 + k], boxes[child, 9 + k])
             else:
                 leaf = ~child
-                for s in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
+                first = (leaf >> 4) * LANES
+                for s in range(first, first + (leaf & 15)):
                     total = np.float32(0.0)
                     for k in range(9):
                         total += corners[s, k]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
+LANES = 8  # triangles of a leaf, tested together
 STACK_SIZE = 64
 
 
@@ -68,8 +69,59 @@ def _box_distance2(boxes, node, at, x, y, z):  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy + dz * dz
 
 
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
+def _lanes_within(blocks, leaf, x, y, z, bound):  # type: ignore[no-untyped-def]
+    """Bits of the triangles of a leaf that may lie within squared distance `bound`: float32, never missing one.
+
+    No branches: the compiler turns the loop into one pass over all lanes. Distances to the plane and to the three edges
+    come from dot products alone; what they may be wrong by grows with the offset and, in the plane, with 1 / sin^2 of
+    the angle between the edges.
+    """
+    zero, one, tiny = np.float32(0.0), np.float32(1.0), np.float32(1e-37)
+    bits = np.int32(0)
+    for k in range(LANES):
+        ax, ay, az = blocks[leaf, 0, k], blocks[leaf, 1, k], blocks[leaf, 2, k]
+        px, py, pz = x - ax, y - ay, z - az
+        ux, uy, uz = blocks[leaf, 3, k] - ax, blocks[leaf, 4, k] - ay, blocks[leaf, 5, k] - az
+        vx, vy, vz = blocks[leaf, 6, k] - ax, blocks[leaf, 7, k] - ay, blocks[leaf, 8, k] - az
+        uu, vv, uv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, ux * vx + uy * vy + uz * vz
+        pu, pv, pp = ux * px + uy * py + uz * pz, vx * px + vy * py + vz * pz, px * px + py * py + pz * pz
+        # edges a-b, a-c, b-c
+        e = pu / (uu if uu > tiny else tiny)
+        e = e if e > zero else zero
+        e = e if e < one else one
+        d = pp - e * (pu + pu - e * uu)
+        e = pv / (vv if vv > tiny else tiny)
+        e = e if e > zero else zero
+        e = e if e < one else one
+        other = pp - e * (pv + pv - e * vv)
+        d = d if d < other else other
+        ww, pw = uu + vv - uv - uv, (pv - pu) + (uu - uv)
+        e = pw / (ww if ww > tiny else tiny)
+        e = e if e > zero else zero
+        e = e if e < one else one
+        other = (pp - pu - pu + uu) - e * (pw + pw - e * ww)
+        d = d if d < other else other
+        # the plane, where the foot lies within
+        det = uu * vv - uv * uv
+        inverse = one / (det if det > tiny else tiny)
+        s, t = vv * pu - uv * pv, uu * pv - uv * pu
+        least = s if s < t else t
+        rest = det - s - t
+        least = least if least < rest else rest
+        other = pp - (s * pu + t * pv) * inverse
+        other = other if other > zero else zero
+        d = other if least > zero else d
+        blur = uu * vv * inverse
+        blur = blur if blur < np.float32(1e6) else np.float32(1e6)
+        size = pp if pp > uu else uu
+        blur = (np.float32(10.0) + blur) * np.float32(4e-7) * size
+        bits = bits | ((np.int32(1) << np.int32(k)) if d - blur <= bound else np.int32(0))
+    return bits
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def closest_one(boxes, children, corners, x, y, z, limit2, stack, keys):  # type: ignore[no-untyped-def]
+def closest_one(boxes, children, corners, blocks, x, y, z, limit2, stack, keys):  # type: ignore[no-untyped-def]
     """Closest point of the skin to (x, y, z) float32 (kernel form).
 
     Returns (slot, squared distance, three barycentric weights); slot is -1 when nothing is nearer than sqrt(limit2),
@@ -100,11 +152,21 @@ def closest_one(boxes, children, corners, x, y, z, limit2, stack, keys):  # type
                         keys[top] = d2
                         top += 1
                 else:
-                    leaf = ~child
-                    for s in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
+                    leaf = ~child >> 4
+                    bits = _lanes_within(blocks, leaf, x, y, z, np.float32(best * 1.000001))
+                    s = leaf * LANES
+                    while bits != 0:
+                        while bits & 1 == 0:
+                            bits >>= 1
+                            s += 1
+                        bits >>= 1
                         d, u, v, w = closest_on_triangle(corners, s, qx, qy, qz)
+                        s += 1
                         if d < best:
-                            best, slot, b0, b1, b2 = d, s, u, v, w
+                            best, slot, b0, b1, b2 = d, s - 1, u, v, w
+                            if bits != 0:
+                                again = _lanes_within(blocks, leaf, x, y, z, np.float32(best * 1.000001))
+                                bits &= again >> np.int32(s - leaf * LANES)
         while node < 0:
             if top == 0:
                 return slot, best, b0, b1, b2
@@ -194,8 +256,8 @@ def ray_one(boxes, children, corners, ox, oy, oz, dx, dy, dz, limit, any_hit, st
                         keys[top] = entry
                         top += 1
                 else:
-                    leaf = ~child
-                    for s in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
+                    first = (~child >> 4) * LANES
+                    for s in range(first, first + (~child & 15)):
                         t, u, v, w = _ray_on_triangle(corners, s, px, py, pz, kx, ky, kz, sx, sy, sz)
                         if 0.0 <= t <= best and (slot < 0 or t < best):
                             slot, best, b0, b1, b2 = s, t, u, v, w

