@@ -36,7 +36,8 @@ from core.mesh.intrinsic_points import (
     read_all,
     read_changed,
 )
-from core.mesh.intrinsic_removal import LARGEST_RING, make_ring, remove_vertex, remove_vertices
+from core.mesh.intrinsic_removal import remove_vertex, remove_vertices
+from core.mesh.intrinsic_star import LARGEST_RING, make_ring
 from core.random import rand
 
 FEWEST = 4  # a piece of skin needs this many vertices that stay
@@ -380,7 +381,7 @@ def _angle_defect(skin: Manifold) -> NDArray[np.float64]:
     b, c = np.roll(a, -1, axis=1), np.roll(a, -2, axis=1)  # the side across from each corner is b
     four = np.sqrt(np.maximum((a + b + c) * (b + c - a) * (c + a - b) * (a + b - c), 0.0))
     angle = np.arctan2(four, a * a + c * c - b * b)
-    return 2.0 * np.pi - np.bincount(skin.origin, angle.ravel(), minlength=skin.vertices)
+    return np.asarray(2.0 * np.pi - np.bincount(skin.origin, angle.ravel(), minlength=skin.vertices))
 
 
 def _surface_area(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> float:
