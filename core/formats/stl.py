@@ -95,7 +95,7 @@ def _read_vertices(data, powers, points):  # type: ignore[no-untyped-def]
         while at < size and data[at] > 32:
             at += 1
         last = at - start - 1
-        if (last == 4 or last == 7) and data[start + last] | 32 == 100 and data[start + last - 4] | 32 == 115:
+        if last in (4, 7) and data[start + last] | 32 == 100 and data[start + last - 4] | 32 == 115:
             while at < size and data[at] != 10 and data[at] != 13:  # "solid" and "endsolid" are followed by a name
                 at += 1
             continue
