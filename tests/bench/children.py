@@ -1,0 +1,164 @@
+"""Scatter, bind and evaluate children; one guide more or less; the quality of the binding on a cat."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.groom.children import Children, evaluate, moved_guides, update_roots
+from core.mesh.intrinsic import SurfaceSites, bind
+from core.mesh.normals import vertex_normals
+from core.mesh.scatter import Scatter, scatter
+from core.workers import Workers
+from tests.bench.bench import Row, median_ms
+from tests.core.mesh import skin_samples as skins
+
+TITLE = "Children: scatter, binding, evaluation"
+
+
+class Coat(NamedTuple):
+    """A cat with guides lying at 15 degrees in random directions."""
+
+    skin: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    normals: NDArray[np.float32]
+    guides: Scatter
+    guide_points: NDArray[np.float32]
+    guide_normals: NDArray[np.float32]
+
+
+def cat_coat(guides: int = 4000) -> Coat:
+    points, triangles = skins.cat()
+    skin = points.astype(np.float32)
+    normals = vertex_normals(skin, triangles)
+    where = scatter(skin, triangles, guides, 1)
+    rng = np.random.default_rng(0)
+    up = np.einsum("nk,nkc->nc", where.barycentric, normals[triangles[where.triangle]])
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    along = np.cross(up, rng.normal(size=up.shape))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    size = 0.05 * np.linalg.norm(np.ptp(points, axis=0))
+    heading = np.sin(np.radians(15)) * up + np.cos(np.radians(15)) * along
+    roots = skins.place((points, triangles), where.triangle, where.barycentric)
+    curves = roots[:, None] + np.linspace(0, size, 16)[:, None] * heading[:, None]
+    return Coat(skin, triangles, normals, where, curves.astype(np.float32), up.astype(np.float32))
+
+
+def seconds(call: object, runs: int = 5) -> float:
+    return median_ms(call, runs) / 1e3  # type: ignore[arg-type]
+
+
+def run() -> list[Row]:
+    coat, workers = cat_coat(), Workers()
+    rows: list[Row] = []
+    places = scatter(coat.skin, coat.triangles, 200_000, 0, workers=workers)
+
+    def bound(where: Scatter) -> Children:
+        children = Children(*where, bind(coat.skin, coat.triangles, *coat.guides, *where), coat.triangles)
+        update_roots(children, coat.skin, coat.normals)
+        return children
+
+    def grow(children: Children, moved: NDArray[np.bool_] | None = None) -> object:
+        return evaluate(children, coat.guide_points, coat.guide_normals, workers, moved=moved)
+
+    children = bound(places)
+    everything = median_ms(lambda: grow(children), 25, 3)
+    rows.append(Row("moved guides to children, 200,000 x 16, all", everything, "ms", 12))
+    later = coat.guide_points.copy()
+    block = np.argsort(np.linalg.norm(later[:, 0] - later[0, 0], axis=1))[:200]
+    later[block, 1:] += np.float32(1e-3)
+    rows.append(
+        Row(
+            "the same when 5 % moved, finding them included",
+            median_ms(lambda: grow(children, moved_guides(coat.guide_points, later, workers.ranges)), 25, 3), "ms", 3,
+        )
+    )
+    scattering = seconds(lambda: scatter(coat.skin, coat.triangles, 200_000, 0, workers=workers), 3)
+    binding = seconds(lambda: bound(places), 5)
+    rows.append(Row("even scatter of 200,000", scattering, "s"))
+    rows.append(Row("bind 200,000 to 4,000 guides", binding, "s"))
+    rows.append(
+        Row("scatter + bind + evaluate 200,000 from 4,000 guides", scattering + binding + everything / 1e3, "s", 0.45)
+    )
+    rows += _one_guide(coat, places)
+    per_child = children.bytes_unbaked / len(children)
+    rows.append(Row("memory of an unbaked child, binding included", per_child, "bytes", 48))
+    rows += _quality(coat)
+    many = bound(scatter(coat.skin, coat.triangles, 1_000_000, 0, candidates=2.0, workers=workers))
+    rows.insert(2, Row("moved guides to children, 1,000,000 x 16", median_ms(lambda: grow(many), 15, 2), "ms", 50))
+    workers.close()
+    return rows
+
+
+def _one_guide(coat: Coat, places: Scatter) -> list[Row]:
+    """A guide added and taken away again, children told."""
+    sites = SurfaceSites(coat.skin, coat.triangles, *coat.guides, *places)
+    children = Children(*places, sites.binding(), coat.triangles)
+    added, removed, share = [], [], []
+    for i in range(200):
+        start = time.perf_counter()
+        rows = children.rebind(sites.add_site(int(places.triangle[-1 - i]), places.barycentric[-1 - i]))
+        added.append(time.perf_counter() - start)
+        share.append(len(rows))
+    for i in range(200):
+        row = (i * 37) % sites.sites
+        start = time.perf_counter()
+        rebound = sites.remove_site(row)
+        children.guide_removed(row)
+        children.rebind(rebound)
+        removed.append(time.perf_counter() - start)
+    return [
+        Row("add one guide (200,000 children)", float(np.median(added)) * 1e3, "ms", 1),
+        Row("remove one guide (200,000 children)", float(np.median(removed)) * 1e3, "ms", 1),
+        Row("children bound again for one guide", 100 * float(np.mean(share)) / len(children), "%", 0.11),
+    ]
+
+
+def _quality(coat: Coat) -> list[Row]:
+    """Continuity, exactness and leakage as the study measured them: 100,000 pairs, random directions."""
+    skin = coat.skin.astype(np.float64), coat.triangles
+    edge = skins.mean_edge(skin)
+    rows = []
+    for count in (500, 4000):
+        rng = np.random.default_rng(count)
+        where = scatter(coat.skin, coat.triangles, count, 0)
+        corners = skin[0][coat.triangles[where.triangle]]
+        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        heading = rng.normal(size=face.shape)
+        heading *= np.sign((heading * face).sum(1, keepdims=True))
+        heading /= np.linalg.norm(heading, axis=1, keepdims=True)
+        heading += face / np.linalg.norm(face, axis=1, keepdims=True)  # hemisphere-like
+        heading /= np.linalg.norm(heading, axis=1, keepdims=True)
+        t, b = skins.sample(skin, 100_000, rng)
+        for share, target in ((0.1, 83.0 if count == 500 else 78.0), (0.001, 1.1)):
+            t2, b2, arrived = skins.walk(skin, t, b, share * edge, rng)
+            both = np.concatenate([t[arrived], t2[arrived]]), np.concatenate([b[arrived], b2[arrived]])
+            found = bind(*skin, *where, *both)
+            mixed = np.einsum("nk,nkc->nc", found.weights.astype(float), heading[found.sites])
+            mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
+            n = int(arrived.sum())
+            angle = np.degrees(2 * np.arcsin(np.minimum(1, np.linalg.norm(mixed[:n] - mixed[n:], axis=1) / 2)))
+            what = f"continuity, {count:,} guides, largest angle between children {share} edge apart"
+            rows.append(Row(what, float(angle.max()), "degrees", target))
+        own = bind(*skin, *where, *where)
+        weight = (own.weights * (own.sites == np.arange(count)[:, None])).sum(axis=1)
+        rows.append(Row(f"exactness, {count:,} guides, least own weight", float(weight.min()), "", 0.9996, True))
+    rows.append(Row("leakage between separate legs 0.02 apart", _leak(), "%", 0))
+    return rows
+
+
+def _leak() -> float:
+    import trimesh
+
+    mesh = trimesh.creation.capsule(1.0, 0.25, count=[32, 32])
+    one = np.array(mesh.vertices), np.array(mesh.faces, np.int32)
+    skin = skins.joined(one, (one[0] + [0.52, 0.0, 0.0], one[1]))
+    sites = scatter(skin[0].astype(np.float32), skin[1], 100, 0)
+    t, b = skins.sample(skin, 50_000, np.random.default_rng(0))
+    found = bind(*skin, *sites, t, b)
+    half = len(one[1])
+    other = (sites.triangle[found.sites] < half) != (t < half)[:, None]
+    return 100.0 * float((found.weights * other).sum()) / len(t)
