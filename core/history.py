@@ -169,6 +169,8 @@ class History(Generic[Value]):
                 size = change_bytes(change)
                 with self._lock:
                     after.change, after.packed, after.packed_bytes = change, True, size
+            if not after.packed:  # cannot be, by the invariant; rather keep memory than turn for ever
+                return
             with self._lock:
                 # the cursor may have moved meanwhile
                 if self._farthest_whole() == (place, near) and self._steps[place] is step and after.packed:
