@@ -19,6 +19,9 @@ from core.mesh.triangulate import triangulate
 from core.workers import Workers
 
 
+FIELD_CELLS = 128  # along the longest side; finer costs seconds, and what is finer is settled exactly
+
+
 class Skin(NamedTuple):
     """A mesh in one pose with its derived data.
 
@@ -68,7 +71,8 @@ def _rest(mesh: Mesh) -> Skin:
 
 
 def _field(mesh: Mesh, workers: Workers) -> DistanceField:
-    return build_distance_field(mesh.points, triangulate(mesh).vertices, workers=workers)
+    longest = float(np.ptp(mesh.points.astype(np.float64), axis=0).max())
+    return build_distance_field(mesh.points, triangulate(mesh).vertices, longest / FIELD_CELLS, workers=workers)
 
 
 def _signed(mesh: Mesh) -> SignedSkin:
