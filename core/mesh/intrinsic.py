@@ -263,7 +263,8 @@ class SurfaceSites:
         net, v = self._net, self._used_vertices
         corners = self._skin.origin[3 * int(face[0]) : 3 * int(face[0]) + 3]
         out = np.empty(3)
-        f = find_place(net, self._count, corners, weights[0], out)
+        anchor, anchor_weights = self._anchor(int(triangle), weights[0])
+        f = find_place(net, self._count, corners, weights[0], anchor, anchor_weights, out)
         if f < 0 or not insert_vertex(net, v, f, out[0], out[1], out[2]):
             return self._rebuild()
         self._used_vertices += 1
@@ -275,6 +276,17 @@ class SurfaceSites:
         self._stay[piece] += 1
         self.edits += 1
         return self._changes()
+
+    def _anchor(self, triangle: int, weights: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+        """The tracked point of that triangle nearest to the place, and its weights in the face; -1 where none is."""
+        start, stop = np.searchsorted(self._tracked_triangle, [triangle, triangle + 1], sorter=self._given)
+        if start == stop or self._skin.face[triangle] < 0:
+            return -1, weights
+        bary = self._tracked_bary[self._given[start:stop]]
+        if self._skin.flipped[triangle]:
+            bary = bary[:, [0, 2, 1]]
+        best = int(((bary - weights) ** 2).sum(axis=1).argmin())
+        return int(start) + best, np.ascontiguousarray(bary[best])
 
     def remove_site(self, row: int) -> Rebound:
         """Take a site away; the points whose binding changed. Rows after it count one less from now on, here and in

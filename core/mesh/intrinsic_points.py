@@ -146,14 +146,16 @@ def read_changed(net, kind, label, given, count, rows, sites, weights, trouble):
     return at
 
 
-@njit(types.int64(NET, types.int64, I1, F1, F1), cache=True, nogil=True)
-def find_place(net, base, corners, weights, out):  # type: ignore[no-untyped-def]
+@njit(types.int64(NET, types.int64, I1, F1, types.int64, F1, F1), cache=True, nogil=True)
+def find_place(net, base, corners, weights, anchor, anchor_weights, out):  # type: ignore[no-untyped-def]
     """Where a place on a mesh triangle lies now: unfold faces until its corners' places are found, then blend.
 
     Parameters
     ----------
     base : the tracked point of vertex v is ``base + v``.
     corners, weights : (3,) the vertices of the mesh triangle and their weights.
+    anchor, anchor_weights : a tracked point of the same mesh triangle near the place (-1: none); the blend of the
+        corners is corrected by how far it is off there.
     out : (3,) written with the weights in the face.
 
     Returns the face, -1 where there is none.
@@ -225,6 +227,13 @@ def find_place(net, base, corners, weights, out):  # type: ignore[no-untyped-def
             total += weights[k]
     x /= total
     y /= total
+    if anchor >= 0 and missing == 0:
+        for j in range(used):
+            if face[j] == net.home[anchor]:
+                for m in range(3):
+                    x += net.bary[anchor, m] * flat[j, 2 * m] - anchor_weights[m] * pos[m, 0]
+                    y += net.bary[anchor, m] * flat[j, 2 * m + 1] - anchor_weights[m] * pos[m, 1]
+                break
     best, least = 0, -np.inf
     for j in range(used):
         ax, ay = flat[j, 0], flat[j, 1]
