@@ -119,10 +119,8 @@ class History(Generic[Value]):
 
     def flush(self) -> None:
         """Wait until everything far from the cursor is packed."""
-        while (job := self._packing) is not None:
-            job.result()
-            if self._packing is job:
-                return
+        if self._packing is not None:
+            self._packing.result()
 
     def close(self) -> None:
         """End the packing thread. The steps stay usable as they are."""
@@ -147,11 +145,11 @@ class History(Generic[Value]):
         return sum(whole.values()) + sum(step.packed_bytes for step in self._steps)
 
     def _start_packing(self) -> None:
-        if self._packing is None or self._packing.done():
-            try:
-                self._packing = self._packer.submit(self._pack)
-            except RuntimeError:  # closed
-                self._packing = None
+        # always a new job, for the last one may just be ending; one that finds nothing to do costs nothing
+        try:
+            self._packing = self._packer.submit(self._pack)
+        except RuntimeError:  # closed
+            self._packing = None
 
     def _pack(self) -> None:
         while True:
