@@ -109,7 +109,7 @@ def _lanes_within(blocks, leaf, x, y, z, bound):  # type: ignore[no-untyped-def]
         least = s if s < t else t
         rest = det - s - t
         least = least if least < rest else rest
-        other = pp - (s * pu + t * pv) * inverse
+        other = pp - (s * inverse) * pu - (t * inverse) * pv
         other = other if other > zero else zero
         d = other if least > zero else d
         blur = uu * vv * inverse

@@ -174,7 +174,7 @@ def test_no_bad_shape_loses_the_nearest_triangle(kind: str) -> None:
     elif kind == "sizes":
         corners = random.normal(size=(count, 1, 3)) * 3 + corners * 10.0 ** random.uniform(-5, 0.5, (count, 1, 1))
     else:
-        corners = corners + [1000, 0, 0]
+        corners = corners + np.array([1000, 0, 0])
     points = corners.reshape(-1, 3).astype(np.float32)
     triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
     queries = _queries(150, 3.0) + np.float32([1000, 0, 0] if kind == "far" else [0, 0, 0])
