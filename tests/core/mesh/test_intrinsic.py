@@ -99,6 +99,28 @@ def test_on_a_cat_neighbours_get_nearly_the_same_binding(sites: int) -> None:
     assert worst[1][1] < 0.05  # a jump would show as about 1
 
 
+def test_what_is_left_is_a_closed_delaunay_triangulation_of_the_sites() -> None:
+    skin, rng = skins.ball(4), np.random.default_rng(11)
+    skin[0][:] *= 1.0 + 0.2 * np.sin(5.0 * skin[0][:, :1]) * np.cos(4.0 * skin[0][:, 1:2])
+    st_, sb = skins.sample(skin, 200, rng)
+    net = SurfaceSites(*skin, st_, sb, st_, sb)
+    for i in range(20):
+        net.add_site(int(st_[i]), [0.3, 0.3, 0.4])
+        net.remove_site(i)
+    n = net._net
+    h = np.flatnonzero(n.origin >= 0)
+    after, before = h - h % 3 + (h + 1) % 3, h - h % 3 + (h + 2) % 3
+    assert (n.twin[n.twin[h]] == h).all()
+    assert (n.origin[n.twin[h]] == n.origin[after]).all()
+    assert np.array_equal(n.length[h], n.length[n.twin[h]])
+    assert len(h) // 3 == 2 * 200 - 4
+    assert set(net._label[n.origin[h]].tolist()) == set(range(200))
+    c, a, b = n.length[h], n.length[after], n.length[before]
+    angle = np.zeros(len(n.origin))
+    angle[h] = np.arccos(np.clip((a * a + b * b - c * c) / (2 * a * b), -1, 1))
+    assert (angle[h] + angle[n.twin[h]]).max() < np.pi + 1e-6
+
+
 def test_sites_bind_to_themselves() -> None:
     skin, rng = skins.cat(), np.random.default_rng(2)
     for sites in (300, 3000):
