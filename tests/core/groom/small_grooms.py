@@ -50,6 +50,7 @@ def mixed(seed: int, guides: Guides | None = None) -> Guides:
     hold[rng.random(n) < 0.2] = 1.0
     locked = rng.random(n) < 0.2
     hold[locked, : p // 2] = 1.0
+    hold[rng.random(n) < 0.15, p // 3] = 1.0  # what stands below a locked point is locked with it
     selected = (rng.random(n) < 0.6) & bool(rng.integers(2))
     return g.replace(
         hold=freeze(hold.astype(np.float32)), frozen=freeze(rng.random(n) < 0.2), selected=freeze(selected))

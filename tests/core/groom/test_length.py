@@ -61,7 +61,7 @@ def test_weights_and_the_minimum():
 
 
 def test_a_cut_leaves_everything_on_the_side_of_the_root():
-    g = bent(8).replace(hold=np.zeros((60, 12), np.float32))
+    g = bent(8).replace(hold=np.zeros((60, 12), np.float32), selected=np.zeros(60, bool))
     for orthographic in (True, False):
         v = view((0.3, -0.2, -1), orthographic)
         column = 285.0
