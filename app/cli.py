@@ -28,7 +28,7 @@ def build(names: tuple[str, ...] = COMMANDS) -> typer.Typer:
     """The typer application with these commands; a command's module is only loaded when it is named."""
     cli = typer.Typer(
         name="filoplume",
-        help="Groom hair on real animals, from the command line. Documents, meshes and coats in; coats and pictures out.",
+        help="Groom hair on real animals: meshes, documents and coats in, coats and pictures out.",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
     except UserError as error:
         code = _fail(str(error), as_json, 1)
     except BrokenPipeError:  # the reader of a pipe went away: not an error worth words
-        sys.stdout = open(os.devnull, "w")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
     except MemoryError:
         code = _fail("there is not enough memory for this; try fewer hairs or a lighter mesh", as_json, 1)

@@ -71,7 +71,9 @@ def grow(
         )
         settle(children.points, field, workers=workers)
         if is_closed(mesh):
-            signed = signed_skin(mesh, evaluator) if not posed else build_signed_skin(skin.points, skin.triangles.vertices)
+            signed = (
+                build_signed_skin(skin.points, skin.triangles.vertices) if posed else signed_skin(mesh, evaluator)
+            )
             settle_exactly(children.points, field, signed, INSIDE_TOLERANCE * skin.diagonal, workers)
     return children
 
@@ -80,11 +82,13 @@ def length_factors(groom: Groom, mesh: Mesh, rest: Skin, places: Scatter, frame:
     """Factors (N,) float32 in rank order: the coat's length, its map, and the variation keyed on the id."""
     coat = groom.coat
     ids = np.arange(len(places.triangle))
-    fields = {"id": ids, **{
+    wanted = {*names_used(coat.length), coat.length_map}
+    fields: dict[str, np.ndarray] = {
         item.name: sample_map(item, mesh, rest.triangles, places.triangle, places.barycentric)
         for item in groom.maps
-        if item.name in names_used(coat.length) or item.name == coat.length_map
-    }}
+        if item.name in wanted
+    }
+    fields["id"] = ids
     factor = evaluate_value(coat.length, frame, fields) * (1.0 - coat.length_variation * rand(ids, coat.seed + 101))
     if coat.length_map is not None:
         factor = factor * fields[coat.length_map]

@@ -35,9 +35,9 @@ class Mesh(Record, kw_only=True):
             column(self, "uvs", np.float32, (len(self.corners), 2))
         if len(self.counts) and (self.counts.min() < 3):
             raise ValueError("Mesh.counts holds a face with fewer than 3 corners")
-        if len(self.corners) and not (0 <= self.corners.min() and self.corners.max() < len(self.points)):
+        if len(self.corners) and not (self.corners.min() >= 0 and self.corners.max() < len(self.points)):
             raise ValueError("Mesh.corners names a vertex that does not exist")
-        if len(self.parts) and not (0 <= self.parts.min() and self.parts.max() < len(self.part_names)):
+        if len(self.parts) and not (self.parts.min() >= 0 and self.parts.max() < len(self.part_names)):
             raise ValueError("Mesh.parts names a part that does not exist")
 
     @property

@@ -18,7 +18,6 @@ from core.mesh.surface import root_positions
 from core.mesh.triangulate import triangulate
 from core.workers import Workers
 
-
 FIELD_CELLS = 128  # along the longest side; finer costs seconds, and what is finer is settled exactly
 
 
@@ -48,7 +47,7 @@ def skin_posed(mesh: Mesh, points: np.ndarray, evaluator: Evaluator) -> Skin:
     if points is mesh.points:
         return rest
     return rest._replace(
-        points=points, normals=mesh_normals(mesh, points), bvh=refit(rest.bvh, points), diagonal=_diagonal(points)
+        points=points, normals=mesh_normals(mesh, points), bvh=refit(rest.bvh, points), diagonal=_diagonal(mesh, points)
     )
 
 
@@ -66,12 +65,12 @@ def _rest(mesh: Mesh) -> Skin:
     triangles = triangulate(mesh)
     return Skin(
         mesh, triangles, mesh.points, mesh_normals(mesh), build_bvh(mesh.points, triangles.vertices),
-        _diagonal(mesh.points),
+        _diagonal(mesh, mesh.points),
     )
 
 
 def _field(mesh: Mesh, workers: Workers) -> DistanceField:
-    longest = float(np.ptp(mesh.points.astype(np.float64), axis=0).max())
+    longest = float(np.ptp(mesh.points[mesh.corners].astype(np.float64), axis=0).max())
     return build_distance_field(mesh.points, triangulate(mesh).vertices, longest / FIELD_CELLS, workers=workers)
 
 
@@ -79,8 +78,9 @@ def _signed(mesh: Mesh) -> SignedSkin:
     return build_signed_skin(mesh.points, triangulate(mesh).vertices)
 
 
-def _diagonal(points: np.ndarray) -> float:
-    return float(np.linalg.norm(np.ptp(points.astype(np.float64), axis=0))) if len(points) else 0.0
+def _diagonal(mesh: Mesh, points: np.ndarray) -> float:
+    used = points[mesh.corners].astype(np.float64)  # vertices no face uses may lie anywhere
+    return float(np.linalg.norm(np.ptp(used, axis=0))) if len(used) else 0.0
 
 
 def root_places(skin: Skin, roots: Roots) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

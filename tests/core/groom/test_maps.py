@@ -46,10 +46,12 @@ def test_vertex_maps_are_linear_on_the_surface():
     triangle = rng.integers(0, 2, 50).astype(np.int32)
     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)[triangles.vertices[triangle]]
     at = np.einsum("nk,nkc->nc", weights, points)
-    np.testing.assert_allclose(sample_vertex_map(values, triangles, triangle, weights), 2 * at[:, 0] + 3 * at[:, 1], atol=1e-5)
+    sampled = sample_vertex_map(values, triangles, triangle, weights)
+    np.testing.assert_allclose(sampled, 2 * at[:, 0] + 3 * at[:, 1], atol=1e-5)
 
 
 def test_an_image_without_uvs_is_refused_in_words():
     mesh, triangles = square(uvs=False)
+    middle = np.full((1, 3), 1 / 3, np.float32)
     with pytest.raises(UserError, match="UVs"):
-        sample_image_map(np.ones((2, 2), np.float32), mesh, triangles, np.zeros(1, np.int32), np.full((1, 3), 1 / 3, np.float32))
+        sample_image_map(np.ones((2, 2), np.float32), mesh, triangles, np.zeros(1, np.int32), middle)
