@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from core.groom.length import cut_at_line, cut_with_ring, grow, lengths, scale_length, set_length
 from core.groom.region import distance_to_path
+from core.groom.resample import with_point_count
 from tests.core.groom.small_grooms import fur, may_change, mixed, stays, view
 
 
@@ -115,3 +116,15 @@ def test_a_mask_keeps_the_far_side_from_the_scissors():
     moved = (after.points != g.points).any(axis=(1, 2))
     assert moved.any()
     assert not moved[~front].any()
+
+
+def test_a_long_segment_toward_the_eye_is_cut_where_the_line_crosses_its_picture():
+    g = with_point_count(fur(), 2)
+    x = g.points.copy()
+    x[:, 1] = x[:, 0] + np.array([1.0, 0.3, 3.5], np.float32)  # the eye is at z = 6
+    g, v = g.replace(points=x), view(orthographic=False)
+    pixels = v.pixels(x)[0][..., 0]
+    crosses = (pixels[:, 0] < 300) & (pixels[:, 1] > 300)
+    after = cut_at_line(g, v, [[300, -9000], [300, 9000]])
+    assert crosses.sum() > 20
+    assert np.abs(v.pixels(after.points[crosses, -1])[0][:, 0] - 300).max() < 0.01

@@ -100,3 +100,17 @@ def test_nothing_to_do_is_the_same_object():
     solid = g.replace(frozen=np.ones(len(g), bool))
     assert smooth(solid) is solid
     assert bends(g).max() == pytest.approx(0, abs=1e-3)
+
+
+def test_hair_on_the_other_side_of_thin_skin_is_no_neighbour():
+    g = fur()
+    other = int(np.argmin(g.roots.frames[:, 2] @ g.roots.frames[0, 2]))  # with the opposite normal
+    near = np.full((len(g), 1), other)
+    only_first = np.zeros(g.hold.shape)
+    only_first[0] = 1.0
+    ruffled = tangled(3)
+    alone = smooth(ruffled, along=0.0, across=1.0, weights=only_first, near=near)
+    assert np.allclose(alone.points[0], ruffled.points[0], atol=1e-6)
+    beside = np.full((len(g), 1), int(np.argsort(-(g.roots.frames[:, 2] @ g.roots.frames[0, 2]))[1]))
+    assert np.abs(smooth(ruffled, along=0.0, across=1.0, weights=only_first, near=beside).points[0]
+                  - ruffled.points[0]).max() > 0.01
