@@ -1,0 +1,48 @@
+"""Where numba keeps compiled kernels: one folder for each state of the sources.
+
+Numba keys a cached kernel on the text of its own file only, so a kernel inlined from another file would stay stale
+after an update. A folder named by a hash over all of core cannot be stale.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+KEEP_DAYS = 14
+
+
+def use_kernel_cache() -> None:
+    """Point numba at the folder of these sources, before numba is imported; NUMBA_CACHE_DIR wins where it is set."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    folder = user_cache_path("filoplume") / f"kernels-{source_hash()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        _forget_old(folder)
+    except OSError:
+        return  # a home that cannot be written to: numba falls back to its own places
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+
+
+def source_hash() -> str:
+    """A short hash of every source file of core."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _forget_old(current: Path) -> None:
+    """Remove the folders of sources nobody has run for a while."""
+    for folder in current.parent.glob("kernels-*"):
+        if folder != current and time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
+            shutil.rmtree(folder, ignore_errors=True)

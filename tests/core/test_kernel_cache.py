@@ -1,0 +1,41 @@
+"""Compiled kernels can never be older than their sources."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from core.kernel_cache import source_hash
+
+ROOT = Path(__file__).parents[2]
+
+
+def cache_of(environment: dict[str, str]) -> str:
+    code = "import core, os, numba; print(numba.config.CACHE_DIR)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT,
+        env={**{k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}, **environment},
+    )
+    return done.stdout.strip()
+
+
+def test_numba_is_pointed_at_the_folder_of_these_sources(tmp_path):
+    assert cache_of({"XDG_CACHE_HOME": str(tmp_path)}) == str(tmp_path / "filoplume" / f"kernels-{source_hash()}")
+
+
+def test_a_folder_given_by_the_environment_wins(tmp_path):
+    assert cache_of({"NUMBA_CACHE_DIR": str(tmp_path)}) == str(tmp_path)
+
+
+def test_folders_of_old_sources_go_after_a_while(tmp_path):
+    old, recent = tmp_path / "filoplume" / "kernels-old", tmp_path / "filoplume" / "kernels-recent"
+    old.mkdir(parents=True)
+    recent.mkdir()
+    os.utime(old, (1e9, 1e9))
+    cache_of({"XDG_CACHE_HOME": str(tmp_path)})
+    assert not old.exists()
+    assert recent.exists()
+
+
+def test_a_home_that_cannot_be_written_to_does_not_stop_the_start():
+    assert cache_of({"XDG_CACHE_HOME": "/proc/nowhere"}) == ""
