@@ -99,4 +99,5 @@ def _ball(segments: int = 128, rings: int = 64) -> Mesh:
     bottom = np.stack([np.full(segments, south), after[-1], number[-1]], axis=-1)
     counts = np.concatenate([np.full(len(quads), 4), np.full(2 * segments, 3)]).astype(np.int32)
     corners = np.concatenate([quads.ravel(), top.ravel(), bottom.ravel()]).astype(np.int32)
-    return Mesh(points=points, counts=counts, corners=corners, parts=np.zeros(len(counts), np.int32), part_names=("ball",))
+    parts = np.zeros(len(counts), np.int32)
+    return Mesh(points=points, counts=counts, corners=corners, parts=parts, part_names=("ball",))
