@@ -181,7 +181,7 @@ def _nearest(heads, grid, normals, counts, cell, mask, radius, x, y, z, own, t):
     return best
 
 
-@njit(
+@njit(  # type: ignore[call-overload]
     types.Tuple((types.int64[::1], types.int64[::1], types.boolean))(  # type: ignore[no-untyped-call]
         I32_1D, F32_2D, F32_1D, F32_2D, I64_1D, types.float64, types.float64, types.int64
     ),
