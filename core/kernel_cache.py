@@ -1,7 +1,7 @@
-"""Where numba keeps compiled kernels: one folder for each state of the sources.
+"""Where numba keeps compiled kernels: one folder for each state of their sources.
 
 Numba keys a cached kernel on the text of its own file only, so a kernel inlined from another file would stay stale
-after an update. A folder named by a hash over all of core cannot be stale.
+after an update. A folder named by a hash over every file with kernels cannot be stale.
 """
 
 from __future__ import annotations
@@ -32,12 +32,14 @@ def use_kernel_cache() -> None:
 
 
 def source_hash() -> str:
-    """A short hash of every source file of core."""
+    """A short hash of every source file of core that has to do with numba."""
     root = Path(__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
-        digest.update(str(path.relative_to(root)).encode())
-        digest.update(path.read_bytes())
+        text = path.read_bytes()
+        if b"numba" in text:
+            digest.update(str(path.relative_to(root)).encode())
+            digest.update(text)
     return digest.hexdigest()[:16]
 
 

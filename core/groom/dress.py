@@ -54,7 +54,7 @@ def dress(
     with stage("field"):
         field = distance_field(mesh, evaluator)
     with stage("guides"):
-        density = density_at(maps, density_map, mesh, skin.triangles)
+        density = density_at(next((m for m in maps if m.name == density_map), None), mesh, skin.triangles)
         where = scatter(
             skin.points, skin.triangles.vertices, guides, seed=seed + 1, density=density, workers=evaluator.workers
         )

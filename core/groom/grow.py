@@ -9,22 +9,25 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.groom.binding import triangle_places
 from core.groom.children import Children, Shape, evaluate, update_roots
 from core.groom.dress import Stage, no_stages
-from core.groom.groom import Groom
+from core.groom.groom import Groom, Map
 from core.groom.maps import density_at, sample_map
 from core.groom.resample import with_point_count
 from core.groom.settle import inside_segments, settle, settle_exactly
 from core.mesh.bvh import closest_points
 from core.mesh.distance_field import build_distance_field
 from core.mesh.edges import is_closed
-from core.mesh.intrinsic import bind
+from core.mesh.intrinsic import Binding, bind
 from core.mesh.mesh import Mesh
+from core.mesh.roots import Roots
 from core.mesh.scatter import Scatter, scatter
 from core.mesh.signed_distance import build_signed_skin
-from core.mesh.skin import Skin, distance_field, root_places, signed_skin, skin_at_rest
+from core.mesh.skin import Skin, distance_field, signed_skin, skin_at_rest
 from core.mesh.surface import root_normals, strands_on_deformed
 from core.random import rand
+from core.record import freeze
 from core.value import evaluate as evaluate_value
 from core.value import names_used
 
@@ -49,13 +52,19 @@ def grow(
     guides = groom.guides
     if guides.points.shape[1] != coat.points:
         guides = with_point_count(guides, coat.points)
+    if len(guides) == 0:
+        raise UserError("this groom has no guides; plant some before hair can grow")
     with stage("scatter"):
-        density = density_at(groom.maps, coat.density_map, mesh, rest.triangles)
-        places = scatter(
-            rest.points, rest.triangles.vertices, coat.count, seed=coat.seed, density=density, workers=workers
-        )
+        thickness = None if coat.density_map is None else groom.map(coat.density_map)
+        places = evaluator.get(_scattered, mesh, thickness, count=coat.count, seed=coat.seed, evaluator=evaluator)
     with stage("bind"):
-        children = _bound(groom, mesh, rest, places)
+        binding = evaluator.get(
+            _bound, mesh, guides.roots, places.triangle, places.barycentric, seed=coat.seed, evaluator=evaluator
+        )
+        uvs = None if mesh.uvs is None else mesh.uvs[rest.triangles.corners]
+        children = Children(
+            places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, coat.points
+        )
     with stage("evaluate"):
         factors = length_factors(groom, mesh, rest, places, frame)
         children.set_length(factors)
@@ -95,17 +104,24 @@ def length_factors(groom: Groom, mesh: Mesh, rest: Skin, places: Scatter, frame:
     return np.ascontiguousarray(np.broadcast_to(factor, ids.shape), np.float32)
 
 
-def _bound(groom: Groom, mesh: Mesh, rest: Skin, places: Scatter) -> Children:
-    if len(groom.guides) == 0:
-        raise UserError("this groom has no guides; plant some before hair can grow")
-    triangle, weights = root_places(rest, groom.guides.roots)
-    binding = bind(
-        rest.points, rest.triangles.vertices, triangle, weights, places.triangle, places.barycentric, groom.coat.seed
+def _scattered(mesh: Mesh, density: Map | None, count: int, seed: int, evaluator: Evaluator) -> Scatter:
+    """Roots of the hairs, once for a mesh, a density map, a count and a seed."""
+    skin = skin_at_rest(mesh, evaluator)
+    places = scatter(
+        skin.points, skin.triangles.vertices, count, seed=seed, density=density_at(density, mesh, skin.triangles),
+        workers=evaluator.workers,
     )
-    uvs = None if mesh.uvs is None else mesh.uvs[rest.triangles.corners]
-    return Children(
-        places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, groom.coat.points
-    )
+    return Scatter(freeze(places.triangle), freeze(places.barycentric))
+
+
+def _bound(
+    mesh: Mesh, roots: Roots, triangle: NDArray[np.int32], barycentric: NDArray[np.float32], seed: int,
+    evaluator: Evaluator,
+) -> Binding:
+    """Hairs bound to guides, once for these roots of both; combing does not come here."""
+    skin = skin_at_rest(mesh, evaluator)
+    site_triangle, site_weights = triangle_places(mesh, skin.triangles, roots)
+    return bind(skin.points, skin.triangles.vertices, site_triangle, site_weights, triangle, barycentric, seed)
 
 
 class Figures(NamedTuple):

@@ -57,10 +57,9 @@ def sample_map(
 
 
 def density_at(
-    maps: tuple[Map, ...], name: str | None, mesh: Mesh, triangles: Triangles
+    item: Map | None, mesh: Mesh, triangles: Triangles
 ) -> Callable[[NDArray[np.int32], NDArray[np.float32]], NDArray[np.float32]] | None:
-    """The density a scatter asks for at its candidates, 0 .. 1, from the map of that name; None without one."""
-    item = next((m for m in maps if m.name == name), None)
+    """The density a scatter asks for at its candidates, 0 .. 1, from a map; None without one."""
     if item is None:
         return None
     return lambda triangle, weights: np.clip(sample_map(item, mesh, triangles, triangle, weights), 0.0, 1.0)

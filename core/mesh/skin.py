@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.evaluator import Evaluator
-from core.mesh.bvh import Bvh, build_bvh, closest_points, refit
+from core.mesh.bvh import Bvh, build_bvh, refit
 from core.mesh.distance_field import DistanceField, build_distance_field
 from core.mesh.mesh import Mesh, Triangles
 from core.mesh.normals import mesh_normals
-from core.mesh.roots import Roots
 from core.mesh.signed_distance import SignedSkin, build_signed_skin
-from core.mesh.surface import root_positions
 from core.mesh.triangulate import triangulate
 from core.workers import Workers
 
@@ -81,32 +78,3 @@ def _signed(mesh: Mesh) -> SignedSkin:
 def _diagonal(mesh: Mesh, points: np.ndarray) -> float:
     used = points[mesh.corners].astype(np.float64)  # vertices no face uses may lie anywhere
     return float(np.linalg.norm(np.ptp(used, axis=0))) if len(used) else 0.0
-
-
-def root_places(skin: Skin, roots: Roots) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Where roots lie on the triangulation: triangle (N,) int32 and barycentric weights (N, 3) float32.
-
-    A root whose three corners are one triangle of its face (as placed) is found exactly; one from another
-    triangulation of that face goes to the closest triangle.
-    """
-    mesh, triangles = skin.mesh, skin.triangles
-    wanted = mesh.starts[roots.faces][:, None] + roots.corners
-    by_face = np.argsort(triangles.faces, kind="stable")
-    first = np.searchsorted(triangles.faces[by_face], np.arange(len(mesh.counts) + 1))
-    triangle = np.full(len(wanted), -1, np.int32)
-    weights = np.zeros((len(wanted), 3), np.float32)
-    row = first[roots.faces].copy()
-    open_rows = np.flatnonzero(row < first[roots.faces + 1])
-    while len(open_rows):
-        candidate = by_face[row[open_rows]]
-        same = triangles.corners[candidate][:, :, None] == wanted[open_rows][:, None, :]
-        found = same.any(axis=2).all(axis=1)
-        hit = open_rows[found]
-        triangle[hit] = candidate[found]
-        weights[hit] = np.where(same[found], roots.weights[hit][:, None, :], 0.0).sum(axis=2)
-        row[open_rows] += 1
-        open_rows = open_rows[~found & (row[open_rows] < first[roots.faces[open_rows] + 1])]
-    lost = np.flatnonzero(triangle < 0)
-    if len(lost):
-        triangle[lost], weights[lost], _ = closest_points(skin.bvh, root_positions(mesh, roots.take(lost)))
-    return triangle, weights
