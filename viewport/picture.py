@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from core.camera import Camera
 from core.errors import UserError
+from core.formats.atomic import atomic_write
 from viewport.context import temporary_context
 from viewport.renderer import Progress, Renderer
 from viewport.scene import Scene, thinned
@@ -86,11 +87,5 @@ def write_png(path: str | Path, image: NDArray[np.uint8]) -> None:
     done, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     if not done:
         raise UserError(f"The picture for {path} could not be encoded; try another size.")
-    target = Path(path)
-    beside = target.with_name(target.name + ".part")
-    try:
+    with atomic_write(path) as beside:
         beside.write_bytes(data.tobytes())
-        beside.replace(target)
-    except OSError as error:
-        beside.unlink(missing_ok=True)
-        raise UserError(f"{path} could not be written ({error.strerror}); choose another place.") from error

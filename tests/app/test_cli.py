@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import struct
 import subprocess
 import sys
@@ -225,3 +226,27 @@ def test_the_command_line_never_loads_qt():
     code = "import sys, app.cli; app.cli.build(); print([m for m in sys.modules if 'PySide' in m or 'PyQt' in m])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_ctrl_c_leaves_no_half_written_file(tmp_path):
+    """Interrupted at moments spread over the whole run: every output is whole or not there, nothing else is left."""
+    ball = write_ball(tmp_path / "ball.obj")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    command = [
+        sys.executable, "-m", "app", "groom", str(ball), "-o", str(folder / "a.usdc"), "-o", str(folder / "a.filo"),
+        "--guides", "100", "--hairs", "20000",
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for seconds in (0.8, 2.2, 3.0, 3.6, 4.4):
+        child = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
+        try:
+            _, words = child.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            child.send_signal(signal.SIGINT)
+            _, words = child.communicate(timeout=60)
+        assert child.returncode in (0, 130, -signal.SIGINT), words
+        assert {path.name for path in folder.iterdir()} <= {"a.usdc", "a.filo"}
+        for path in folder.iterdir():
+            assert filoplume("check", path).returncode == 0
+            path.unlink()
