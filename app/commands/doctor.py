@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 PACKAGES = {
-    "numpy": "numpy", "scipy": "scipy", "numba": "numba", "msgspec": "msgspec", "trimesh": "trimesh",
+    "numpy": "numpy", "scipy": "scipy", "numba": "numba", "msgspec": "msgspec",
     "opencv-python-headless": "cv2", "usd-core": "pxr", "alembic3d": "alembic3d", "moderngl": "moderngl",
 }
 GL_PROBE = (
