@@ -75,7 +75,8 @@ def convert(source: Path, target: Path, unit: str | None, up: str | None, say: S
 
 
 def draw_file(
-    path: Path, png: Path, size: tuple[int, int], view: str, frame: float | None, say: Say
+    path: Path, png: Path, size: tuple[int, int], view: str, frame: float | None, say: Say, unit: str | None = None,
+    up: str | None = None,
 ) -> None:
     """Draw whatever `path` holds into `png`."""
     _must_exist(path)
@@ -83,11 +84,11 @@ def draw_file(
     if path.suffix.lower() in PROJECT:
         document = project.read_project(path).document
     else:
-        curves = _curves(path)
+        curves = _curves(path, unit, up)
         if curves is not None:
             draw_strands(png, curves.groom, size, view)
             return
-        mesh = mesh_file.read_mesh(path, say=say)
+        mesh = mesh_file.read_mesh(path, unit=unit, up=up, say=say)
         document = Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),))
     skins = posed_document(document, frame, evaluator)
     children = {g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id]) for g in document.grooms}

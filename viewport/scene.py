@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 Color = tuple[float, float, float]
+MOST_BOUNDING = 50_000  # strands looked at to find how large the scene is
 Floats = NDArray[np.float32]
 
 
@@ -151,11 +152,12 @@ def scene_extent(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def all_points(scene: Scene) -> list[np.ndarray]:
-    """Arrays (n, 3) that bound the scene: vertices of the surfaces; roots, middles and tips of hairs and guides."""
+    """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (of many, every few)."""
     found = [surface.points for surface in scene.surfaces]
     for points in [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]:
         axis = 2 if points.shape[1] == 3 else 1
-        for at in (0, points.shape[axis] // 2, points.shape[axis] - 1):
+        points = points[:: 1 + len(points) // MOST_BOUNDING]
+        for at in range(points.shape[axis]):
             found.append(points.take(at, axis=axis))
     return found
 

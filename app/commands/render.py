@@ -20,6 +20,8 @@ def command(
     size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1600x1000",
     frame: Annotated[float | None, typer.Option(help="Frame of the clip to show; at rest when not given.")] = None,
     view: Annotated[str, typer.Option(help=f"One of {', '.join(VIEWS)}.")] = "three-quarter",
+    unit: Annotated[str | None, typer.Option(help="Unit of FILE where it does not say: m, cm, mm, in, ft.")] = None,
+    up: Annotated[str | None, typer.Option(help="Up axis of FILE where it does not say: y or z.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Draw a file."""
@@ -32,5 +34,5 @@ def command(
         raise UserError(f"{output.name}: pictures are written as .png")
     report = Report(as_json)
     with report.working(total=1), report.stage("picture", f"drawing {output.name}"):
-        draw_file(file, output, (int(match[1]), int(match[2])), view, frame, report.note)
+        draw_file(file, output, (int(match[1]), int(match[2])), view, frame, report.note, unit, up)
     report.done({"outputs": [str(output)], "seconds": report.seconds}, [str(output)])
