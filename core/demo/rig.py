@@ -6,7 +6,7 @@ import numpy as np
 
 from core.curve import Curve, Key, curve_at
 from core.demo.shape import Shape
-from core.pose.skeleton import Clip, Rig, Skeleton, Skin
+from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
 from core.transform import quaternion_about, quaternion_product, translation
 
 FIRST_FRAME, FRAMES = 1001, 48
@@ -45,7 +45,7 @@ def rig(animal: Shape) -> Rig:
     weights = animal.weights[:, [animal.joints.index(name) for name in names]]
     strongest = np.argsort(-weights, axis=1, kind="stable")[:, :_INFLUENCES]
     kept = np.take_along_axis(weights, strongest, axis=1)
-    skin = Skin(
+    skin = SkinWeights(
         joints=strongest.astype(np.int32),
         weights=(kept / kept.sum(axis=1, keepdims=True)).astype(np.float32),
     )

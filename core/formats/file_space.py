@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from core.document import METRES_PER_UNIT
 from core.errors import UserError
-
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
 def metres_of(unit: str | float) -> float:
@@ -21,9 +20,9 @@ def metres_of(unit: str | float) -> float:
         For an unknown name, or a number that is not above zero.
     """
     if isinstance(unit, str):
-        if unit not in METRES:
-            raise UserError(f"The unit {unit} is not known; use one of {', '.join(METRES)}.")
-        return METRES[unit]
+        if unit not in METRES_PER_UNIT:
+            raise UserError(f"The unit {unit} is not known; use one of {', '.join(METRES_PER_UNIT)}.")
+        return METRES_PER_UNIT[unit]
     if not (np.isfinite(unit) and unit > 0):
         raise UserError(f"A unit of {unit} metres makes no sense; it must be above zero.")
     return float(unit)

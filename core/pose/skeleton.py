@@ -68,7 +68,7 @@ class Clip(Record, kw_only=True):
         return self.start + len(self.translations) - 1
 
 
-class Skin(Record):
+class SkinWeights(Record):
     """Which joints move each vertex.
 
     joints : (V, K) int32.
@@ -84,19 +84,19 @@ class Skin(Record):
         if self.weights.size and (
             self.weights.min() < 0.0 or np.abs(self.weights.sum(axis=1, dtype=np.float64) - 1.0).max() > 1e-3
         ):
-            raise ValueError("Skin.weights must be positive and sum to 1 on every vertex")
+            raise ValueError("SkinWeights.weights must be positive and sum to 1 on every vertex")
 
 
 class Rig(Record):
     """A skeleton, the skin it moves and, where there is one, its motion."""
 
     skeleton: Skeleton
-    skin: Skin
+    skin: SkinWeights
     clip: Clip | None = None
 
     def __post_init__(self) -> None:
         joints = len(self.skeleton.names)
         if self.skin.joints.size and not (self.skin.joints.min() >= 0 and self.skin.joints.max() < joints):
-            raise ValueError("Skin.joints names a joint the skeleton does not have")
+            raise ValueError("SkinWeights.joints names a joint the skeleton does not have")
         if self.clip is not None and self.clip.translations.shape[1] != joints:
             raise ValueError("Clip has another number of joints than the skeleton")

@@ -17,7 +17,7 @@ from core.document import (
     without_mesh,
 )
 from core.errors import UserError
-from core.pose.skeleton import Rig, Skeleton, Skin
+from core.pose.skeleton import Rig, Skeleton, SkinWeights
 from tests.documents import grid_mesh, small_document
 
 
@@ -75,7 +75,7 @@ def test_a_rig_moves_the_vertices_of_its_mesh():
     skeleton = Skeleton(
         names=("a",), parents=np.array([-1], np.int32), rest=np.eye(4)[None], bind=np.eye(4)[None]
     )
-    skin = Skin(joints=np.zeros((5, 1), np.int32), weights=np.ones((5, 1), np.float32))
+    skin = SkinWeights(joints=np.zeros((5, 1), np.int32), weights=np.ones((5, 1), np.float32))
     with pytest.raises(ValueError, match="5 vertices of 16"):
         item.replace(rig=Rig(skeleton=skeleton, skin=skin))
 

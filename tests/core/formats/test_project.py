@@ -19,7 +19,7 @@ from core.formats.project import check_project, project_info, read_project, writ
 from core.formats.tree import decode_envelope, encode_tree
 from core.formats.upgrade import FORMAT, upgrade
 from core.leaves import array_bytes, leaves, same_bits
-from core.pose.skeleton import Clip, Rig, Skeleton, Skin
+from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
 from core.record import freeze, is_frozen
 from core.value import formula
 from tests.documents import small_document, small_workspace, stroked
@@ -34,7 +34,7 @@ def _with_rig(document):
         names=("hip", "head"), parents=np.array([-1, 0], np.int32), rest=np.tile(np.eye(4), (2, 1, 1)),
         bind=np.tile(np.eye(4), (2, 1, 1)),
     )
-    skin = Skin(joints=np.zeros((count, 1), np.int32), weights=np.ones((count, 1), np.float32))
+    skin = SkinWeights(joints=np.zeros((count, 1), np.int32), weights=np.ones((count, 1), np.float32))
     clip = Clip(
         translations=np.zeros((3, 2, 3), np.float32), rotations=np.tile(np.float32([0, 0, 0, 1]), (3, 2, 1)),
         scales=np.ones((3, 2, 3), np.float32),

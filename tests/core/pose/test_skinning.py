@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
-from core.pose.skeleton import Clip, Rig, Skeleton, Skin
+from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
 from core.pose.skinning import local_matrices, object_matrices, posed_points, skin_matrices
 from core.transform import compose, transform_points
 from core.workers import Workers
@@ -21,7 +21,7 @@ def some_rig(joints=5, vertices=400, frames=4, influences=3):
     plain = Skeleton(names=names, parents=parents, rest=rest, bind=np.tile(np.eye(4), (joints, 1, 1)))
     skeleton = plain.replace(bind=object_matrices(plain, rest))
     weights = rng.dirichlet(np.ones(influences), vertices).astype(np.float32)
-    skin = Skin(joints=rng.integers(0, joints, (vertices, influences)).astype(np.int32), weights=weights)
+    skin = SkinWeights(joints=rng.integers(0, joints, (vertices, influences)).astype(np.int32), weights=weights)
     clip = Clip(
         translations=rng.normal(size=(frames, joints, 3)).astype(np.float32),
         rotations=Rotation.random(frames * joints, random_state=9).as_quat().reshape(frames, joints, 4).astype("f4"),
@@ -80,7 +80,8 @@ def test_one_joint_is_rigid_and_frames_between_are_mixed():
 def test_two_joints_in_closed_form():
     """At equal weights the blend of a joint at rest and one that moves is the mean of both places."""
     rig, points = some_rig(joints=2, influences=2)
-    both = Skin(joints=np.tile(np.int32([0, 1]), (len(points), 1)), weights=np.full((len(points), 2), 0.5, np.float32))
+    joints, weights = np.tile(np.int32([0, 1]), (len(points), 1)), np.full((len(points), 2), 0.5, np.float32)
+    both = SkinWeights(joints=joints, weights=weights)
     rig = rig.replace(skin=both)
     m = skin_matrices(rig, 1002)
     truth = 0.5 * (transform_points(m[0], points) + transform_points(m[1], points))
