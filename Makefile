@@ -3,6 +3,10 @@ SHELL := /bin/bash
 PY := .venv/bin/python
 export PYTHONPATH := $(CURDIR)
 FILE ?=
+# real animals for tests and benchmarks, where they lie beside the checkout
+ifneq ($(wildcard ../shared/data),)
+export FILOPLUME_DATA ?= $(abspath ../shared/data)
+endif
 
 .DEFAULT_GOAL := help
 .PHONY: help run test check bench soak lock pictures clean

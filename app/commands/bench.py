@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import pkgutil
+import sys
 from typing import Annotated
 
 import typer
@@ -26,7 +27,13 @@ def command(
     tables = {}
     for one in [name] if name else names:
         module = importlib.import_module(f"tests.bench.{one}")
-        rows = module.run()
+        try:
+            rows = module.run()
+        except UserError as error:
+            if name is not None:
+                raise
+            print(f"\n{module.TITLE}: not measured, {error}", file=sys.stderr)
+            continue
         tables[one] = [dict(row._asdict(), reached=_reached(row)) for row in rows]
         if not as_json:
             _show(module.TITLE, tables[one], markdown)
