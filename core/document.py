@@ -1,4 +1,4 @@
-"""The document: everything the artist makes, one frozen value. Beside it the workspace, which undo leaves alone."""
+"""The document: everything the artist makes, one frozen value."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from core.camera import Camera
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
@@ -67,25 +66,6 @@ class Document(Record):
         for groom in self.grooms:
             if groom.mesh_id not in mesh_ids:
                 raise ValueError(f"Document.grooms: the mesh {groom.mesh_id} of groom {groom.name!r} does not exist")
-
-
-class Workspace(Record):
-    """Where the artist left off; saved beside the document, outside undo.
-
-    frame : the current frame.
-    cameras : the cameras of the views, first the one last used.
-    panels : names of the visible panels.
-    tool : name of the active tool; params : its parameters as plain JSON values, never changed in place.
-    """
-
-    frame: float = 1001.0
-    cameras: tuple[Camera, ...] = ()
-    panels: tuple[str, ...] = ()
-    tool: str = ""
-    params: dict[str, Any] = {}  # noqa: RUF012 (msgspec makes a new one each time)
-
-    def __post_init__(self) -> None:
-        number(self, "frame", least=-(2**31), most=2**31 - 1)
 
 
 def find_mesh(document: Document, mesh_id: int) -> MeshObject:

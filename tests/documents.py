@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from core.camera import Camera
-from core.document import Document, MeshObject, Workspace
+from core.document import Document, MeshObject
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
 from core.mesh.mesh import Mesh
 from core.mesh.roots import Roots
 from core.record import freeze
+from core.workspace import Workspace
 
 
 def grid_mesh(side: int) -> Mesh:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from core.document import Document, Workspace
+from core.document import Document
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats.arrays import ArrayHashes
@@ -15,6 +15,7 @@ from core.formats.journal import Journal, remove_journal, state_folder
 from core.formats.project import read_project, write_project
 from core.formats.recovery import abandoned, recover, recover_newest
 from core.history import DEFAULT_BUDGET, History
+from core.workspace import Workspace
 
 Listener = Callable[[Document, Document], None]
 

@@ -27,13 +27,14 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 import platformdirs
 
-from core.document import Document, Workspace
+from core.document import Document
 from core.errors import UserError
 from core.formats.arrays import ArrayHashes, raw_bytes, spec_of
 from core.formats.tree import encode_tree
 from core.leaves import Path as LeafPath
 from core.leaves import leaves
 from core.rows import RowChange, row_change
+from core.workspace import Workspace
 
 MAGIC = b"\x89FILOJ\r\n"
 HEADER = struct.Struct("<8sB3xQ32s")  # magic, type, length, sha256; then the CRC of these, 4 bytes

@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from core.document import Document, Workspace, problems
+from core.document import Document, problems
 from core.errors import UserError
 from core.formats.arrays import ArrayHashes, ArraySpec, array_from, raw_bytes, spec_of
 from core.formats.atomic import atomic_write
 from core.formats.tree import LARGEST_TREE, MOST_ARRAYS, Encoded, Envelope, decode_envelope, decode_part, encode_tree
+from core.workspace import Workspace
 
 TREE = "document.json"
 _MEMBER = re.compile(r"arrays/([0-9a-f]{64})\.npy")

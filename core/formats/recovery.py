@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from core.document import Document, Workspace, problems
+from core.document import Document, problems
 from core.formats.arrays import ArraySpec, array_from
 from core.formats.journal import COMMIT, DELTA, DELTA_HEADER, HEADER, HEADER_SIZE, LOCK, MAGIC, OBJECT, SUFFIXES
 from core.formats.tree import LARGEST_TREE, decode_envelope, decode_part
+from core.workspace import Workspace
 
 MOST_TRIED = 1000  # intact commits looked at before a file is given up
 LARGEST_JOURNAL = 16 << 30

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple, TypeVar
 import msgspec
 import numpy as np
 
-from core.document import Document, Workspace
+from core.document import Document
 from core.errors import UserError
 from core.formats.arrays import ArrayHashes, ArraySpec, spec_of
 from core.formats.upgrade import FORMAT, upgrade
+from core.workspace import Workspace
 
 LARGEST_TREE = 16 << 20  # bytes of JSON
 DEEPEST_TREE = 48

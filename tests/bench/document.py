@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.document import Document, MeshObject, Workspace, with_groom
+from core.document import Document, MeshObject, with_groom
 from core.formats.journal import Journal
 from core.formats.project import read_project, write_project
 from core.formats.recovery import recover
@@ -17,6 +17,7 @@ from core.history import History
 from core.leaves import array_bytes, same_bits
 from core.mesh.mesh import Mesh
 from core.record import freeze
+from core.workspace import Workspace
 from tests.bench.bench import Row, median_ms
 from tests.documents import grid_mesh, guides_on
 from tools.session import Session

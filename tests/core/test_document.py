@@ -6,7 +6,6 @@ import pytest
 from core.document import (
     Document,
     MeshObject,
-    Workspace,
     find_groom,
     find_mesh,
     free_id,
@@ -18,6 +17,7 @@ from core.document import (
 )
 from core.errors import UserError
 from core.pose.skeleton import Rig, Skeleton, SkinWeights
+from core.workspace import Workspace
 from tests.documents import grid_mesh, small_document
 
 

@@ -18,7 +18,8 @@ class Brush(Record):
 def test_only_described_fields_are_found_in_their_order() -> None:
     found = fields_of(Brush)
     assert list(found) == ["size", "mode"]
-    assert found["size"].unit == "px" and found["size"].soft == (4, 400) and found["size"].label == "Size"
+    size = found["size"]
+    assert (size.unit, size.soft, size.label) == ("px", (4, 400), "Size")
     assert found["mode"].choices == ("a", "b")
 
 

@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.document import Document, Workspace
+from core.document import Document
 from core.errors import UserError
 from core.formats.journal import CURRENT, Journal
 from core.formats.project import read_project
 from core.formats.recovery import abandoned
 from core.leaves import same_bits
+from core.workspace import Workspace
 from tests.documents import small_document, stroked
 from tools.session import Session
 

@@ -11,10 +11,11 @@ import sys
 import time
 from pathlib import Path
 
-from core.document import Document, Workspace
+from core.document import Document
 from core.formats.journal import Journal
 from core.formats.project import write_project
 from core.formats.recovery import recover_newest
+from core.workspace import Workspace
 from tests.documents import small_document, stroked
 from tools.session import Session
 

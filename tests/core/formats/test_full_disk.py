@@ -5,12 +5,12 @@ import subprocess
 
 import pytest
 
-from core.document import Workspace
 from core.errors import UserError
 from core.formats.journal import Journal
 from core.formats.project import read_project, write_project
 from core.formats.recovery import recover
 from core.leaves import same_bits
+from core.workspace import Workspace
 from tests.documents import small_document, stroked
 
 

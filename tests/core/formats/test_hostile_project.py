@@ -27,10 +27,10 @@ from hostile_parts import (
     with_member,
 )
 
-from core.document import Workspace
 from core.errors import UserError
 from core.formats.project import check_project, read_project, write_project
 from core.leaves import same_bits
+from core.workspace import Workspace
 from tests.documents import small_document
 
 GROOM = ("grooms", 0)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from failing_disk import Disk, failing
 
-from core.document import Document, Workspace, with_groom
+from core.document import Document, with_groom
 from core.errors import UserError
 from core.formats.arrays import ArrayHashes, ArraySpec, array_from, hash_array, spec_of
 from core.formats.project import check_project, project_info, read_project, write_project
@@ -22,6 +22,7 @@ from core.leaves import array_bytes, leaves, same_bits
 from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
 from core.record import freeze, is_frozen
 from core.value import formula
+from core.workspace import Workspace
 from tests.documents import small_document, small_workspace, stroked
 
 BASELINES = Path(__file__).parents[3] / "resources" / "baselines"

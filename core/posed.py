@@ -1,0 +1,53 @@
+"""The animal at a frame of its clip: skins and collision fields, remembered by the evaluator."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.document import MeshObject
+from core.evaluator import Evaluator
+from core.mesh.distance_field import DistanceField, build_distance_field
+from core.mesh.mesh import Mesh
+from core.mesh.skin import FIELD_CELLS, Skin, distance_field, skin_at_rest, skin_posed
+from core.pose.skeleton import Rig
+from core.pose.skinning import posed_points
+from core.record import freeze
+
+
+def moves(item: MeshObject) -> bool:
+    """True when the mesh has a clip that can pose it."""
+    return item.rig is not None and item.rig.clip is not None
+
+
+def skin_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> Skin:
+    """The skin of a mesh at a frame; at rest without a frame or without a clip."""
+    if frame is None or not moves(item):
+        return skin_at_rest(item.mesh, evaluator)
+    points = evaluator.get(_points, item.mesh, item.rig, frame=float(frame), evaluator=evaluator)
+    return evaluator.get(_skin, item.mesh, points, evaluator=evaluator)
+
+
+def field_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> DistanceField:
+    """The field to collide with at that frame."""
+    skin = skin_at(item, frame, evaluator)
+    if skin.points is item.mesh.points:
+        return distance_field(item.mesh, evaluator)
+    return evaluator.get(_field, item.mesh, skin.points, evaluator=evaluator)
+
+
+def _points(mesh: Mesh, rig: Rig, frame: float, evaluator: Evaluator) -> NDArray[np.float32]:
+    points = posed_points(mesh.points, rig, frame, evaluator.workers.ranges)
+    # a pose that moves nothing but by rounding is the rest itself, so that all that is known of it serves
+    rounding = 1e-6 * skin_at_rest(mesh, evaluator).diagonal
+    return mesh.points if float(np.abs(points - mesh.points).max(initial=0.0)) <= rounding else freeze(points)
+
+
+def _skin(mesh: Mesh, points: NDArray[np.float32], evaluator: Evaluator) -> Skin:
+    return skin_posed(mesh, points, evaluator)
+
+
+def _field(mesh: Mesh, points: NDArray[np.float32], evaluator: Evaluator) -> DistanceField:
+    vertices = skin_at_rest(mesh, evaluator).triangles.vertices
+    longest = float(np.ptp(points[mesh.corners].astype(np.float64), axis=0).max())
+    return build_distance_field(points, vertices, longest / FIELD_CELLS, workers=evaluator.workers)

@@ -1,0 +1,89 @@
+"""The workspace: where the artist left off. Saved beside the document, outside undo."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from core.camera import Camera
+from core.field import field
+from core.record import Record, number, text
+
+SHADINGS = ("shaded", "matcap", "wire", "lines")
+
+
+class Respect(Record):
+    """What every tool heeds. Frozen guides are never edited, whatever stands here."""
+
+    hairspray: Annotated[bool, field(
+        "Hairspray", "Sprayed hair holds its shape under every tool; off edits it as if it were free.")] = True
+    selection: Annotated[bool, field(
+        "Selection", "While any guides are selected tools edit only those; off edits all of them.")] = True
+    symmetry: Annotated[bool, field(
+        "Symmetry X", "Every stroke is made on the other side of the animal too, across its own X = 0 plane.")] = False
+
+
+class Reference(Record):
+    """An image pinned to the view. Place and width are fractions of the view's width and height from its top left."""
+
+    path: str
+    x: float = 0.02
+    y: float = 0.02
+    width: float = 0.25
+    opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        text(self, "path", longest=4096)
+        number(self, "x", "y", least=-10.0, most=10.0)
+        number(self, "width", least=0.001, most=10.0)
+        number(self, "opacity", least=0.0, most=1.0)
+
+
+class ViewOptions(Record):
+    """How the viewport shows the document.
+
+    shading : of meshes, one of SHADINGS. map : name of the map shown as colours on the skin, or None.
+    isolated : ids of the only meshes shown (with their grooms), empty for all; ghosted : ids shown translucent.
+    background : path of an image behind everything, or None.
+    """
+
+    shading: str = "shaded"
+    wire: bool = False
+    hair: bool = True
+    guides: bool = True
+    grid: bool = True
+    axes: bool = True
+    hud: bool = True
+    map: str | None = None
+    isolated: tuple[int, ...] = ()
+    ghosted: tuple[int, ...] = ()
+    background: str | None = None
+    references: tuple[Reference, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.shading not in SHADINGS:
+            raise ValueError(f"ViewOptions.shading must be one of {', '.join(SHADINGS)}, not {self.shading!r}")
+
+
+class Workspace(Record):
+    """Where the artist left off.
+
+    frame : the current frame.
+    cameras : the cameras of the views, first the one last used. bookmarks : cameras by name.
+    panels : names of the visible panels.
+    groom : id of the groom that tools edit; None for the first of the document.
+    tool : name of the active tool; params : parameters of the tools by name as plain JSON values, never changed in
+        place.
+    """
+
+    frame: float = 1001.0
+    cameras: tuple[Camera, ...] = ()
+    bookmarks: dict[str, Camera] = {}  # noqa: RUF012 (msgspec makes a new one each time)
+    panels: tuple[str, ...] = ()
+    groom: int | None = None
+    tool: str = ""
+    params: dict[str, Any] = {}  # noqa: RUF012 (msgspec makes a new one each time)
+    respect: Respect = Respect()
+    view: ViewOptions = ViewOptions()
+
+    def __post_init__(self) -> None:
+        number(self, "frame", least=-(2**31), most=2**31 - 1)
