@@ -125,6 +125,33 @@ def strands_on_deformed(
     return out
 
 
+def rest_from_posed(
+    mesh: Mesh,
+    roots: Roots,
+    posed_strands: NDArray[np.float32],
+    deformed_points: NDArray[np.float32],
+    normals: NDArray[np.float32] | None = None,
+) -> NDArray[np.float32]:
+    """The other way round: strands edited on the deformed skin, as they stand at rest; x = x0 + F0^T F1 (x' - x0').
+
+    Parameters
+    ----------
+    posed_strands : (N, P, 3) float32, object space on the deformed skin.
+    deformed_points : (V, 3) float32, the deformed vertices. normals : (V, 3) float32 there, where the caller has them.
+
+    Returns
+    -------
+    (N, P, 3) float32, what :func:`strands_on_deformed` carries to `posed_strands` to rounding (about 1e-7 of the size
+    of the animal). Rounding touches strands nobody edited too: keep those, and every root, as they were.
+    """
+    rest = root_positions(mesh, roots)
+    moved = root_positions(mesh, roots, deformed_points)
+    frames = root_frames(mesh, roots, deformed_points, normals)
+    out = np.empty(posed_strands.shape, np.float32)
+    _carry(np.ascontiguousarray(posed_strands, np.float32), moved, rest, frames, roots.frames, out)
+    return out
+
+
 @njit(types.void(F32_2D, I32_2D, F32_2D, types.float32[:, ::1]), cache=True, nogil=True)
 def _blend(points, vertices, weights, out):  # type: ignore[no-untyped-def]
     for i in range(len(vertices)):

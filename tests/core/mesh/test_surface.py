@@ -5,7 +5,14 @@ from scipy.spatial.transform import Rotation
 
 from core.mesh.mesh import Mesh, Triangles
 from core.mesh.roots import Roots
-from core.mesh.surface import place_roots, root_frames, root_normals, root_positions, strands_on_deformed
+from core.mesh.surface import (
+    place_roots,
+    rest_from_posed,
+    root_frames,
+    root_normals,
+    root_positions,
+    strands_on_deformed,
+)
 
 
 def _skin(uvs: bool = True) -> tuple[Mesh, Triangles]:
@@ -95,6 +102,28 @@ def test_any_deformation_keeps_roots_on_the_skin_and_lengths() -> None:
     np.testing.assert_allclose(np.linalg.norm(np.diff(carried, axis=1), axis=2), 0.1, atol=1e-5)
     along = (carried[:, -1] - carried[:, 0]) / 0.4
     np.testing.assert_allclose(along, root_normals(mesh, roots, moved), atol=1e-5)
+
+
+@pytest.mark.parametrize("uvs", [True, False])
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.5, 1.0, 0.6), (0.4, 2.0, 1.3)])
+@pytest.mark.parametrize("seed", range(4))
+def test_posed_strands_go_back_to_rest_and_rest_to_posed(uvs: bool, stretch: tuple, seed: int) -> None:
+    mesh, triangles = _skin(uvs)
+    roots, _, _ = _roots(mesh, triangles)
+    random = np.random.default_rng(seed)
+    moved = mesh.points * stretch + np.sin(mesh.points[:, [2, 0, 1]] * 3) * 0.1 * seed
+    moved = (moved @ Rotation.random(random_state=seed).as_matrix().T + [0.3, -1, 0.5]).astype(np.float32)
+    diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    strands = (root_positions(mesh, roots)[:, None] + random.normal(size=(500, 6, 3)) * 0.2).astype(np.float32)
+    strands[:, 0] = root_positions(mesh, roots)
+    back = rest_from_posed(mesh, roots, strands_on_deformed(mesh, roots, strands, moved), moved)
+    assert np.abs(back - strands).max() < 1e-6 * diagonal
+    np.testing.assert_array_equal(back[:, 0], strands[:, 0])
+    # and what was edited there stands there again
+    edited = strands_on_deformed(mesh, roots, strands, moved)
+    edited[:, 1:] += (random.normal(size=(500, 5, 3)) * 0.1).astype(np.float32)
+    again = strands_on_deformed(mesh, roots, rest_from_posed(mesh, roots, edited, moved), moved)
+    assert np.abs(again - edited).max() < 1e-6 * diagonal
 
 
 def test_rest_is_rest() -> None:
