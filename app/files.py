@@ -91,7 +91,10 @@ def draw_file(
         mesh = mesh_file.read_mesh(path, unit=unit, up=up, say=say)
         document = Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),))
     skins = posed_document(document, frame, evaluator)
-    children = {g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id]) for g in document.grooms}
+    now = document.first_frame if frame is None else frame
+    children = {
+        g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id], frame=now) for g in document.grooms
+    }
     draw(png, document, children, evaluator, size, view, skins=skins)
 
 
@@ -109,12 +112,13 @@ def _convert_document(document: Document, target: Path) -> dict[str, Any]:
     children = {}
     if suffix not in PROJECT:
         first = document.grooms[0]
-        children = {first.id: grow(first, meshes[first.mesh_id], evaluator)}
+        children = {first.id: grow(first, meshes[first.mesh_id], evaluator, frame=document.first_frame)}
     deliver(target, document, children)
-    return {
-        "guides": sum(len(g.guides) for g in document.grooms),
-        "hairs": sum(len(c) for c in children.values()) if children else sum(g.coat.count for g in document.grooms),
-    }
+    if children:
+        hairs = sum(len(c.shown(c.traits.density)) for c in children.values())
+    else:
+        hairs = sum(g.coat.count for g in document.grooms)
+    return {"guides": sum(len(g.guides) for g in document.grooms), "hairs": hairs}
 
 
 def _curves(path: Path, unit: str | None = None, up: str | None = None) -> CurveFile | None:

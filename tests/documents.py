@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from core.camera import Camera
-from core.document import Document, MeshObject
+from core.curve import Curve, Key
+from core.document import Document, MeshObject, with_groom
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
 from core.mesh.mesh import Mesh
 from core.mesh.roots import Roots
 from core.record import freeze
+from core.value import Value, constant, formula
 from core.workspace import Workspace
 
 
@@ -65,6 +67,19 @@ def small_workspace() -> Workspace:
     """A workspace with one of everything."""
     camera = Camera(world_from_camera=np.eye(4))
     return Workspace(frame=1012.5, cameras=(camera,), panels=("history",), tool="comb", params={"radius": 0.25})
+
+
+def animated_document() -> Document:
+    """The small document with a coat whose values are of every kind: what the baselines of the formats hold."""
+    document = small_document()
+    groom = document.grooms[0]
+    keys = (Key(frame=1001.0, value=0.1), Key(frame=1010.0, value=0.6, leave="free", leave_handle=(2.0, 0.1)))
+    coat = groom.coat.replace(
+        density=formula("clamp(0.5 + u, 0, 1)"), length=constant(1.25, "density"), clump=Value(base=Curve(keys=keys)),
+        frizz=Value(base=Curve(keys=keys, before="cycle", after="linear"), map="density"),
+        width_root=formula("1e-4 * (1 + rand(id, 7))", "density"), length_variation=constant(0.3),
+    )
+    return with_groom(document, groom.replace(coat=coat))
 
 
 def stroked(document: Document, seed: int, share: float = 0.3) -> Document:

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from core.document import Document
-from core.groom.children import Children
+from core.groom.children import Children, Traits
 from core.groom.groom import Coat as CoatRecord
 from core.groom.strands import GroomStrands, Strands
 from core.mesh.skin import Skin
-from viewport.scene import Coat, Color, GuideLines, Look, Scene, Surface
+from viewport.scene import Coat, Color, GuideLines, Look, Scene, Surface, mean_width
 
 SKIN = (0.36, 0.35, 0.34)
 DRAWN_POINTS = 16
@@ -19,7 +19,7 @@ DRAWN_POINTS = 16
 
 def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[int, Children]) -> Scene:
     """The scene of every visible mesh (in the pose of its skin) and every coat in `children` (by groom id)."""
-    coats = {g.mesh_id: look_of(g.coat) for g in document.grooms if g.id in children}
+    coats = {g.mesh_id: look_of(g.coat, children[g.id].traits) for g in document.grooms if g.id in children}
     surfaces = tuple(
         Surface(
             skins[item.id].points, skins[item.id].normals, skins[item.id].triangles.vertices,
@@ -29,7 +29,7 @@ def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[in
         if not item.hidden
     )
     hair = tuple(
-        Coat(children[g.id].points, children[g.id].ids, children[g.id].roots()[1], look_of(g.coat))
+        coat_of(g.coat, children[g.id])
         for g in document.grooms
         if g.id in children and len(children[g.id])
     )
@@ -42,11 +42,30 @@ def skin_of(look: Look) -> Color:
     return (r, g, b)
 
 
-def look_of(coat: CoatRecord) -> Look:
-    """How the hairs of a coat look."""
-    return Look(
-        root=coat.color_root, tip=coat.color_tip, root_width=coat.width_root, tip_width=coat.width_tip,
+def coat_of(coat: CoatRecord, children: Children) -> Coat:
+    """The hairs shown at the density they were grown at; the very arrays of `children` when that is all of them."""
+    traits = children.traits
+    look = look_of(coat, traits)
+    widths = None
+    if isinstance(traits.width_root, np.ndarray) or isinstance(traits.width_tip, np.ndarray):
+        mean = mean_width(look)
+        each = traits.width_root + (np.asarray(traits.width_tip) - traits.width_root) / 3.0
+        widths = (each / mean if mean > 0.0 else np.zeros_like(each)).astype(np.float32)
+    whole = Coat(children.points, children.ids, children.roots()[1], look, widths=widths)
+    rows = children.shown(traits.density)
+    if len(rows) == len(children):
+        return whole
+    rows = np.sort(rows)  # by place, as `thinned` wants them
+    return whole._replace(
+        points=whole.points[rows], ids=whole.ids[rows], normals=whole.normals[rows],
+        widths=None if widths is None else widths[rows],
     )
+
+
+def look_of(coat: CoatRecord, traits: Traits) -> Look:
+    """How the hairs of a coat look; widths that differ are here the average of them all."""
+    root, tip = (float(np.mean(width)) if np.size(width) else 0.0 for width in (traits.width_root, traits.width_tip))
+    return Look(root=coat.color_root, tip=coat.color_tip, root_width=root, tip_width=tip)
 
 
 def scene_of_strands(groom: GroomStrands) -> Scene:

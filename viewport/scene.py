@@ -22,12 +22,16 @@ class Surface(NamedTuple):
 
     points : (V, 3) float32. normals : (V, 3) float32, unit. triangles : (T, 3) int32.
     color : linear RGB of the skin; under a coat take :func:`skin_under`.
+    values : (V,) float32 or None, a map to be shown as colours, 0 .. 1.
+    ghost : drawn translucent.
     """
 
     points: np.ndarray
     normals: np.ndarray
     triangles: np.ndarray
     color: Color = (0.36, 0.35, 0.34)
+    values: np.ndarray | None = None
+    ghost: bool = False
 
 
 class Look(NamedTuple):
@@ -59,6 +63,8 @@ class Coat(NamedTuple):
     ids : (N,) integers; the variation between hairs is keyed on them.
     normals : (N, 3) float32, unit, of the skin at the roots.
     tints : (N, 3) float32 or None, linear factors on the colour of each hair (a painted map).
+    widths : (N,) float32 or None, factors on the width of each hair.
+    order : (M,) int32 or None, the rows that are shown, any first part of them an even coat; None for all rows.
     """
 
     points: np.ndarray
@@ -66,6 +72,8 @@ class Coat(NamedTuple):
     normals: np.ndarray
     look: Look = Look()
     tints: np.ndarray | None = None
+    widths: np.ndarray | None = None
+    order: np.ndarray | None = None
 
 
 class GuideLines(NamedTuple):
@@ -122,7 +130,13 @@ def thinned(coat: Coat, most: int) -> Coat:
         np.ascontiguousarray(coat.points[::step]), np.asarray(coat.ids)[::step], coat.normals[::step],
         look._replace(root_width=look.root_width * wider, tip_width=look.tip_width * wider),
         None if coat.tints is None else coat.tints[::step],
+        None if coat.widths is None else coat.widths[::step],
     )
+
+
+def mean_width(look: Look) -> float:
+    """Mean diameter in metres along a hair: the taper goes with the square of the way from the root."""
+    return look.root_width + (look.tip_width - look.root_width) / 3.0
 
 
 def skin_under(look: Look) -> Color:

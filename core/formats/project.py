@@ -12,6 +12,7 @@ import re
 import struct
 import zipfile
 import zlib
+from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,8 @@ from core.errors import UserError
 from core.formats.arrays import ArrayHashes, ArraySpec, array_from, raw_bytes, spec_of
 from core.formats.atomic import atomic_write
 from core.formats.tree import LARGEST_TREE, MOST_ARRAYS, Encoded, Envelope, decode_envelope, decode_part, encode_tree
+from core.groom.groom import Coat
+from core.value import Constant
 from core.workspace import Workspace
 
 TREE = "document.json"
@@ -124,10 +127,18 @@ def project_info(path: str | os.PathLike[str]) -> dict[str, Any]:
         "faces": sum(len(item.mesh.counts) for item in document.meshes),
         "grooms": [groom.name for groom in document.grooms],
         "guides": sum(len(groom.guides) for groom in document.grooms),
-        "hairs": sum(round(groom.coat.count * groom.coat.density) for groom in document.grooms),
+        "hairs": sum(_hairs(groom.coat) for groom in document.grooms),
         "bytes": os.path.getsize(path),
         "problems": [],
     }
+
+
+def _hairs(coat: Coat) -> int:
+    """Hairs shown; of a density that differs from hair to hair, which only growing can tell, all that are grown."""
+    density = coat.density.base
+    if isinstance(density, Constant) and coat.density.map is None:
+        return ceil(coat.count * density.number - 1e-9)
+    return coat.count
 
 
 def _member(digest: str) -> str:

@@ -7,10 +7,36 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 1
+FORMAT = 2
+
+VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
+
+
+def coats_of_values(raw: Raw) -> Raw:
+    """1 -> 2: six plain numbers of every coat become constants, as its length already was.
+
+    What has not the expected form is left alone, for decoding to refuse with the path of the field.
+    """
+
+    def constant(number: Any) -> Any:
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            return number
+        return {"base": {"type": "constant", "number": number}, "map": None}
+
+    def groom(old: Any) -> Any:
+        coat = old.get("coat") if isinstance(old, dict) else None
+        if not isinstance(coat, dict):
+            return old
+        return {**old, "coat": {key: constant(v) if key in VALUES_OF_2 else v for key, v in coat.items()}}
+
+    document = raw.get("document")
+    if not isinstance(document, dict) or not isinstance(document.get("grooms"), list):
+        return raw
+    return {**raw, "document": {**document, "grooms": [groom(old) for old in document["grooms"]]}}
+
 
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
-UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {}
+UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:

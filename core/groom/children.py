@@ -21,12 +21,27 @@ Ranges = Callable[..., None]
 BLOCK = 2048  # children shaped while they are still in the cache
 
 
+Number = float | NDArray[np.float32]  # the same for all children, or (N,), one for each row
+
+
 class Shape(NamedTuple):
     """What is done to children after interpolation, see :mod:`core.groom.children_shape`; zero does nothing."""
 
-    clump: float = 0.0
-    frizz: float = 0.0
+    clump: Number = 0.0
+    frizz: Number = 0.0
     seed: int = 0
+
+
+class Traits(NamedTuple):
+    """What the values of a coat came to at one frame: numbers, or columns in the order of the rows of children.
+
+    density : share of the children shown, 0 .. 1. width_root, width_tip : diameters, metres.
+    """
+
+    shape: Shape = Shape()
+    density: Number = 1.0
+    width_root: Number = 8e-5
+    width_tip: Number = 2e-5
 
 
 class Baked(NamedTuple):
@@ -46,7 +61,8 @@ class Children:
     ids : (N,) int32, stable id and rank: any prefix by id is an even coat.
     triangle, bary : (N,) int32 and (N, 2) float32, where they stand on the skin; the third weight is 1 - sum.
     sites, weights : (N, 3) int32 rows of guides and (N, 2) float32; the third weight is 1 - sum.
-    length : (N,) float32, factor on the interpolated curve; write through :meth:`set_length`.
+    length : (N,) float32, factor on the interpolated curve.
+    traits : what the coat says about them; :func:`core.groom.coat_values.set_coat` writes it and the length.
     points : (N, 3, P) float32, written by :func:`evaluate`; made at first use.
 
     Parameters
@@ -67,6 +83,7 @@ class Children:
         self.sites = np.ascontiguousarray(binding.sites[order])
         self.weights = np.ascontiguousarray(binding.weights[order, :2])
         self.length = np.ones(len(order), np.float32)
+        self.traits = Traits()
         self.count = count
         self.triangles = np.ascontiguousarray(triangles, np.int32)
         self.triangle_uvs = triangle_uvs
@@ -90,7 +107,8 @@ class Children:
     @property
     def bytes_unbaked(self) -> int:
         """Bytes of all columns but the points."""
-        return sum(c.nbytes for c in (self.ids, self.triangle, self.bary, self.sites, self.weights, self.length))
+        columns = (self.ids, self.triangle, self.bary, self.sites, self.weights, self.length)
+        return sum(c.nbytes for c in columns + self.traits[1:] + self.traits.shape[:2] if isinstance(c, np.ndarray))
 
     @property
     def row_of(self) -> NDArray[np.int32]:
@@ -100,15 +118,12 @@ class Children:
             self._row_of[self.ids] = np.arange(len(self), dtype=np.int32)
         return self._row_of
 
-    def set_length(self, factors: NDArray[np.float32]) -> None:
-        """Set the length factors from (N,) values in rank order."""
-        self.length = np.ascontiguousarray(np.asarray(factors, np.float32)[self.ids])
-
     def rebind(self, rebound: Rebound) -> NDArray[np.int32]:
         """Take over changed bindings; the rows to be evaluated again. Rows keep their place, ids their row."""
         rows = self.row_of[rebound.rows]
         self.sites[rows] = rebound.sites
-        self._guides = max(self._guides, int(rebound.sites.max()) + 1 if len(rows) else 0)
+        before = self._guides if len(rows) < len(self) else 0
+        self._guides = max(before, int(rebound.sites.max()) + 1 if len(rows) else 0)
         self.weights[rows] = rebound.weights[:, :2]
         return rows
 
@@ -130,28 +145,45 @@ class Children:
         parts.sort()
         return parts_joined(rows, parts)
 
-    def roots(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def roots(self, ranges: Ranges = serial_ranges) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Where the children stand on the skin as it is now and their unit normals, (N, 3) float32 each."""
         root, normal = np.empty((len(self), 3), np.float32), np.empty((len(self), 3), np.float32)
         skin_points, skin_normals = self._skin()
-        kernels.child_roots(
-            skin_points, skin_normals, self.triangles, self.triangle, self.bary, 0, len(self), root, normal
-        )
+        ranges(len(self), lambda start, stop: kernels.child_roots(
+            skin_points, skin_normals, self.triangles, self.triangle, self.bary, start, stop, root, normal
+        ), 16384)
         return root, normal
 
-    def baked(self, density: float = 1.0, ranges: Ranges = serial_ranges) -> Baked:
-        """The evaluated children with rank below `density` times their number, in rank order."""
-        shown = int(np.ceil(np.clip(density, 0.0, 1.0) * len(self) - 1e-9))
-        rows = np.ascontiguousarray(self.row_of[:shown])
-        points = np.empty((shown, self.count, 3), np.float32)
+    def shown(self, density: Number = 1.0) -> NDArray[np.int32]:
+        """Rows of the children with rank below `density` times their number, in rank order.
+
+        With a density for each row a child is kept by its own, so that none pops while another changes.
+        """
+        if isinstance(density, np.ndarray):
+            return self.row_of[np.sort(self.ids[self.ids < density.astype(np.float64) * len(self) - 1e-9])]
+        return self.row_of[: int(np.ceil(np.clip(density, 0.0, 1.0) * len(self) - 1e-9))]
+
+    def baked(self, density: Number = 1.0, ranges: Ranges = serial_ranges) -> Baked:
+        """The evaluated children :meth:`shown` at that density, in rank order."""
+        rows = np.ascontiguousarray(self.shown(density))
+        points = np.empty((len(rows), self.count, 3), np.float32)
         source = self.points
-        ranges(shown, lambda start, stop: kernels.bake_rows(source, rows, start, stop, points))
-        bary = _third(self.bary[rows])
-        if self.triangle_uvs is None:
-            uvs = np.zeros((shown, 2), np.float32)
-        else:
-            uvs = np.einsum("nk,nkc->nc", bary, self.triangle_uvs[self.triangle[rows]]).astype(np.float32)
+        ranges(len(rows), lambda start, stop: kernels.bake_rows(source, rows, start, stop, points))
+        uvs = self.root_uvs(rows)
+        if uvs is None:
+            uvs = np.zeros((len(rows), 2), np.float32)
         return Baked(points, self.ids[rows], uvs, self.sites[rows], _third(self.weights[rows]))
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Weights (N, 3) of the corners of the triangle each stands on."""
+        return _third(self.bary)
+
+    def root_uvs(self, rows: NDArray[np.int32] | slice = slice(None)) -> NDArray[np.float32] | None:
+        """Where the children of these rows stand by UV, (n, 2) float32; None when the skin has no UVs."""
+        if self.triangle_uvs is None:
+            return None
+        uvs = np.einsum("nk,nkc->nc", _third(self.bary[rows]), self.triangle_uvs[self.triangle[rows]])
+        return np.asarray(uvs, np.float32)
 
     def _skin(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         if self.skin_points is None or self.skin_normals is None:
@@ -168,6 +200,15 @@ def parts_joined(rows: NDArray[np.int32], parts: list[tuple[int, int]]) -> NDArr
 
 def _third(two: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([two, 1.0 - two.sum(axis=1, keepdims=True, dtype=np.float32)], axis=1)
+
+
+def _column(number: Number, count: int) -> NDArray[np.float32]:
+    """A number for kernels: (1,) float32 when it is the same for all, else (count,)."""
+    if not isinstance(number, np.ndarray):
+        return np.full(1, number, np.float32)
+    if number.shape != (count,):
+        raise ValueError(f"{count} children need one number for all or {count} of them, not {number.shape}")
+    return np.ascontiguousarray(number, np.float32)
 
 
 def update_roots(children: Children, points: NDArray[np.float32], normals: NDArray[np.float32]) -> None:
@@ -235,7 +276,8 @@ def evaluate(
         count = len(wanted)
     grow = kernels.grow_16 if children.count == 16 else kernels.grow_any
     out = children.points
-    shaped = shape.clump > 0.0 or shape.frizz > 0.0
+    clump, frizz = _column(shape.clump, len(children)), _column(shape.frizz, len(children))
+    shaped = bool((clump > 0.0).any() or (frizz > 0.0).any())
     if shaped:
         profile, waves = clump_profile(children.count), frizz_waves(children.count, shape.seed)
         guide_roots = np.ascontiguousarray(guide_points[:, 0])
@@ -251,7 +293,7 @@ def evaluate(
             if shaped:
                 shape_children(
                     prepared, children.ids, guide_roots, children.length, children.sites, children.weights, profile,
-                    waves, guide_normals, shape.clump, shape.frizz, shape.seed, wanted, some, a, b, out,
+                    waves, guide_normals, clump, frizz, shape.seed, wanted, some, a, b, out,
                 )
 
     ranges(count, part)

@@ -34,12 +34,11 @@ def frizz_waves(points: int, seed: int) -> NDArray[np.float32]:
 
 
 @njit(
-    types.void(F3, I1, F2, F1, I2, F2, F1, F2, F2, types.float32, types.float32, types.int64, I1, types.boolean,
-               I8, I8, OUT_F3),
+    types.void(F3, I1, F2, F1, I2, F2, F1, F2, F2, F1, F1, types.int64, I1, types.boolean, I8, I8, OUT_F3),
     cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp", "afn"},
 )
 def shape_children(  # type: ignore[no-untyped-def]
-    guides, ids, guide_roots, length, sites, weights, profile, waves, normals, clump, frizz, seed, rows, some,
+    guides, ids, guide_roots, length, sites, weights, profile, waves, normals, clumps, frizzes, seed, rows, some,
     start, stop, out,
 ):
     """Draw children towards the curve of their strongest guide, then wave them along the skin.
@@ -49,12 +48,14 @@ def shape_children(  # type: ignore[no-untyped-def]
     guides : (G, 4, P) prepared guides. guide_roots : (G, 3) where they stand.
     profile : (P,). waves : (WAVES, P).
     normals : (G, 3) of the guides: frizz is square to the strongest guide's, so that it lowers no hair onto the skin.
-    clump, frizz : 0 .. 1. A child far from its guide, for its length, closes up less.
+    clumps, frizzes : 0 .. 1, (N,), or (1,) when they are the same for all. A child far from its guide, for its
+        length, closes up less.
     """
     count = out.shape[2]
     last = np.float32(count - 1)
     for i in range(start, stop):
         r = rows[i] if some else i
+        clump, frizz = clumps[r if len(clumps) > 1 else 0], frizzes[r if len(frizzes) > 1 else 0]
         w0, w1 = weights[r, 0], weights[r, 1]
         w2 = np.float32(1.0) - w0 - w1
         s = sites[r, 0] if w0 >= w1 and w0 >= w2 else (sites[r, 1] if w1 >= w2 else sites[r, 2])

@@ -11,7 +11,7 @@ from core.errors import UserError
 from core.evaluator import Evaluator
 from core.groom.collide import push_out
 from core.groom.flow import Flow, flow_field
-from core.groom.groom import Coat, Groom, Map
+from core.groom.groom import WIDEST, Coat, Groom, Map
 from core.groom.maps import density_at
 from core.groom.style import Style, lay_guides, length_factors
 from core.mesh.mesh import Mesh
@@ -19,8 +19,8 @@ from core.mesh.scatter import scatter
 from core.mesh.skin import Skin, distance_field, skin_at_rest
 from core.mesh.surface import place_roots, root_positions
 from core.record import freeze
+from core.value import constant
 
-THICKEST = 1e3  # metres; only meshes in absurd units get there
 Stage = Callable[[str], AbstractContextManager[None]]
 
 
@@ -73,10 +73,11 @@ def dress(
         )
         laid = push_out(laid, field, ranges=evaluator.workers.ranges)
     coat = Coat(
-        count=hairs, seed=seed, width_root=min(style.width_root * skin.diagonal, THICKEST),
-        width_tip=min(style.width_tip * skin.diagonal, THICKEST),
-        color_root=style.color_root, color_tip=style.color_tip, clump=style.clump, frizz=style.frizz,
-        length_variation=style.length_variation, density_map=density_map, length_map=length_map,
+        count=hairs, seed=seed, width_root=constant(min(style.width_root * skin.diagonal, WIDEST)),
+        width_tip=constant(min(style.width_tip * skin.diagonal, WIDEST)),
+        color_root=style.color_root, color_tip=style.color_tip, clump=constant(style.clump),
+        frizz=constant(style.frizz), length_variation=constant(style.length_variation),
+        density_map=density_map, length_map=length_map,
     )
     return Groom(id=1, name=name, mesh_id=mesh_id, guides=laid, coat=coat, maps=maps)
 

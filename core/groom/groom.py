@@ -2,54 +2,98 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
+from core.field import field, fields_of
 from core.groom.guides import Guides
 from core.record import Record, column, number, text
-from core.value import Value, constant
+from core.value import Value, check_constant, check_names, constant, value_field
 
 MOST_CHILDREN = 20_000_000
 LARGEST_MAP = 16384  # pixels along a side
+LONGEST = 1e3  # factor on the length of the guides
+WIDEST = 1e3  # metres; only meshes in absurd units get there
+NAMES = ("frame", "id", "u", "v")  # what an expression of a coat may read for each hair, beside the groom's maps
 
 
 class Coat(Record):
     """What the children (the hairs) of a groom are like.
 
-    count : children wanted at density 1.
-    seed : of everything random about the coat.
-    density : 0 .. 1, the share of the children shown.
-    length : factor on the length of the guides; may follow the frame, an expression, a map.
-    width_root, width_tip : DIAMETERS in metres.
-    color_root, color_tip : linear RGB.
-    clump : 0 .. 1, how far hairs close up towards their guide.
-    frizz : 0 .. 1.
-    length_variation : 0 .. 1, the largest share a hair may be shorter.
-    points : points on each child.
-    density_map, length_map : names of maps of the groom, or None.
+    What an artist would animate is a :class:`core.value.Value`: its expression may read :data:`NAMES` and every map of
+    the groom, for each hair, and any of it may be multiplied by a map. The annotations hold the ranges: a lone
+    constant must lie in the hard one, any other value is held in it after it is evaluated.
+
+    density_map : name of the map of the groom the roots are scattered by, or None. `density` then takes hairs away
+        without moving the others.
+    length_map : name of the map of the groom that multiplies the length beside `length`, or None.
     """
 
-    count: int = 100_000
-    seed: int = 0
-    density: float = 1.0
-    length: Value = constant(1.0)
-    width_root: float = 8e-5
-    width_tip: float = 2e-5
-    color_root: tuple[float, float, float] = (0.10, 0.06, 0.035)
-    color_tip: tuple[float, float, float] = (0.36, 0.24, 0.14)
-    clump: float = 0.0
-    frizz: float = 0.0
-    length_variation: float = 0.0
-    points: int = 16
-    density_map: str | None = None
-    length_map: str | None = None
+    count: Annotated[int, field(
+        "Hairs", "How many hairs are grown where the density is 1; change it to thicken the whole coat.",
+        soft=(1_000, 500_000), hard=(0, MOST_CHILDREN),
+    )] = 100_000
+    seed: Annotated[int, field(
+        "Seed", "Another number scatters and varies the hairs another way; the same one gives the same coat.",
+        soft=(0, 100), hard=(0, 2**32 - 1), step=1,
+    )] = 0
+    density: Annotated[Value, value_field(
+        "Density", "The share of the hairs that is kept; the others stay where they are when you change it.",
+        soft=(0.0, 1.0), hard=(0.0, 1.0),
+    )] = constant(1.0)
+    length: Annotated[Value, value_field(
+        "Length", "Factor on the length of the guides for every hair; 1 is as long as the guides around it.",
+        soft=(0.0, 2.0), hard=(0.0, LONGEST),
+    )] = constant(1.0)
+    width_root: Annotated[Value, value_field(
+        "Width at the root", "Diameter of a hair where it leaves the skin, in metres; fur has about 0.00005.",
+        "m", soft=(0.0, 5e-4), hard=(0.0, WIDEST),
+    )] = constant(8e-5)
+    width_tip: Annotated[Value, value_field(
+        "Width at the tip", "Diameter of a hair at its end, in metres; less than at the root makes it taper.",
+        "m", soft=(0.0, 5e-4), hard=(0.0, WIDEST),
+    )] = constant(2e-5)
+    color_root: Annotated[tuple[float, float, float], field(
+        "Colour at the root", "Colour of the hairs where they leave the skin, as linear red, green and blue.",
+        soft=(0.0, 1.0),
+    )] = (0.10, 0.06, 0.035)
+    color_tip: Annotated[tuple[float, float, float], field(
+        "Colour at the tip", "Colour of the hairs at their ends, as linear red, green and blue.", soft=(0.0, 1.0),
+    )] = (0.36, 0.24, 0.14)
+    clump: Annotated[Value, value_field(
+        "Clump", "How far hairs close up towards their guide at the tip; 0 not at all, 1 wet.",
+        soft=(0.0, 1.0), hard=(0.0, 1.0),
+    )] = constant(0.0)
+    frizz: Annotated[Value, value_field(
+        "Frizz", "How much each hair waves by itself, growing from its root to its tip; 0 is smooth.",
+        soft=(0.0, 1.0), hard=(0.0, 1.0),
+    )] = constant(0.0)
+    length_variation: Annotated[Value, value_field(
+        "Length variation", "The largest share by which a hair may be shorter than its neighbours; 0 cuts them even.",
+        soft=(0.0, 1.0), hard=(0.0, 1.0),
+    )] = constant(0.0)
+    points: Annotated[int, field(
+        "Points", "Points along every hair; more follow tight curls better but take more memory and time.",
+        soft=(4, 32), hard=(2, 1024), step=1,
+    )] = 16
+    density_map: Annotated[str | None, field(
+        "Density map", "The map that says where hair grows: 1 is full, 0 is bare skin.",
+    )] = None
+    length_map: Annotated[str | None, field(
+        "Length map", "The map that multiplies the length of the hairs: 1 is full length, 0 none.",
+    )] = None
 
     def __post_init__(self) -> None:
-        number(self, "count", least=0, most=MOST_CHILDREN)
-        number(self, "seed", least=0, most=2**32 - 1)
-        number(self, "density", "clump", "frizz", "length_variation", least=0.0, most=1.0)
-        number(self, "width_root", "width_tip", least=0.0, most=1e3)
         number(self, "color_root", "color_tip", least=0.0, most=1e4)
-        number(self, "points", least=2, most=1024)
+        for name, known in COAT_FIELDS.items():
+            if known.hard is not None:
+                check = check_constant if name in COAT_VALUES else number
+                check(self, name, least=known.hard[0], most=known.hard[1])
+
+
+COAT_FIELDS = fields_of(Coat)
+COAT_VALUES = ("density", "length", "width_root", "width_tip", "clump", "frizz", "length_variation")
 
 
 class Map(Record):
@@ -98,6 +142,9 @@ class Groom(Record):
         for wanted in (self.coat.density_map, self.coat.length_map):
             if wanted is not None and wanted not in names:
                 raise ValueError(f"Groom.coat uses the map {wanted!r}, which the groom does not have")
+        readable = [name for name in names if name not in NAMES]
+        for name in COAT_VALUES:
+            check_names(getattr(self.coat, name), NAMES, readable, COAT_FIELDS[name].label)
 
     def map(self, name: str) -> Map | None:
         """The map of that name, or None."""

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.groom.binding import triangle_places
-from core.groom.children import Children, Shape, evaluate, update_roots
+from core.groom.children import Children, evaluate, update_roots
+from core.groom.coat_values import set_coat
 from core.groom.dress import Stage, no_stages
 from core.groom.groom import Groom, Map
-from core.groom.maps import density_at, sample_map
+from core.groom.maps import density_at
 from core.groom.resample import with_point_count
 from core.groom.settle import inside_segments, settle, settle_exactly
 from core.mesh.bvh import closest_points
@@ -26,10 +27,7 @@ from core.mesh.scatter import Scatter, scatter
 from core.mesh.signed_distance import build_signed_skin
 from core.mesh.skin import Skin, distance_field, signed_skin, skin_at_rest
 from core.mesh.surface import root_normals, strands_on_deformed
-from core.random import rand
 from core.record import freeze
-from core.value import evaluate as evaluate_value
-from core.value import names_used
 
 INSIDE_TOLERANCE = 1e-5  # of the bounding-box diagonal: what float32 roots may lie under the skin
 
@@ -56,7 +54,7 @@ def grow(
         raise UserError("this groom has no guides; plant some before hair can grow")
     with stage("scatter"):
         thickness = None if coat.density_map is None else groom.map(coat.density_map)
-        places = evaluator.get(_scattered, mesh, thickness, count=coat.count, seed=coat.seed, evaluator=evaluator)
+        places = evaluator.get(scattered, mesh, thickness, count=coat.count, seed=coat.seed, evaluator=evaluator)
     with stage("bind"):
         binding = evaluator.get(
             _bound, mesh, guides.roots, places.triangle, places.barycentric, seed=coat.seed, evaluator=evaluator
@@ -66,13 +64,12 @@ def grow(
             places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, coat.points
         )
     with stage("evaluate"):
-        factors = length_factors(groom, mesh, rest, places, frame)
-        children.set_length(factors)
+        set_coat(children, groom, mesh, rest, frame)
         posed = skin is not rest
         points = strands_on_deformed(mesh, guides.roots, guides.points, skin.points) if posed else guides.points
         normals = root_normals(mesh, guides.roots, skin.points if posed else None)
         update_roots(children, skin.points, skin.normals)
-        evaluate(children, points, normals, workers, shape=Shape(coat.clump, coat.frizz, coat.seed))
+        evaluate(children, points, normals, workers, shape=children.traits.shape)
     with stage("settle"):
         field = (
             build_distance_field(skin.points, skin.triangles.vertices, workers=workers)
@@ -87,24 +84,7 @@ def grow(
     return children
 
 
-def length_factors(groom: Groom, mesh: Mesh, rest: Skin, places: Scatter, frame: float) -> NDArray[np.float32]:
-    """Factors (N,) float32 in rank order: the coat's length, its map, and the variation keyed on the id."""
-    coat = groom.coat
-    ids = np.arange(len(places.triangle))
-    wanted = {*names_used(coat.length), coat.length_map}
-    fields: dict[str, np.ndarray] = {
-        item.name: sample_map(item, mesh, rest.triangles, places.triangle, places.barycentric)
-        for item in groom.maps
-        if item.name in wanted
-    }
-    fields["id"] = ids
-    factor = evaluate_value(coat.length, frame, fields) * (1.0 - coat.length_variation * rand(ids, coat.seed + 101))
-    if coat.length_map is not None:
-        factor = factor * fields[coat.length_map]
-    return np.ascontiguousarray(np.broadcast_to(factor, ids.shape), np.float32)
-
-
-def _scattered(mesh: Mesh, density: Map | None, count: int, seed: int, evaluator: Evaluator) -> Scatter:
+def scattered(mesh: Mesh, density: Map | None, count: int, seed: int, evaluator: Evaluator) -> Scatter:
     """Roots of the hairs, once for a mesh, a density map, a count and a seed."""
     skin = skin_at_rest(mesh, evaluator)
     places = scatter(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from core.change import Splice, Swap, Walk, change_bytes, difference
 from core.document import free_id, with_groom
 from core.leaves import array_bytes, leaves, same_bits
+from core.value import constant
 from tests.documents import small_document, stroked
 
 
@@ -32,7 +33,7 @@ def _edits():
         base,
         stroked(base, 1),
         stroked(base, 2, share=1.0),
-        with_groom(base, groom.replace(coat=groom.coat.replace(frizz=0.25))),
+        with_groom(base, groom.replace(coat=groom.coat.replace(frizz=constant(0.25)))),
         with_groom(base, groom.replace(coat=groom.coat.replace(density_map=None), maps=())),
         with_groom(base, groom.replace(guides=fewer)),
         two,

@@ -11,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from core.history import History
 from core.leaves import array_bytes, same_bits
+from core.value import constant
 from tests.documents import small_document, stroked
 
 
@@ -154,7 +155,8 @@ class HistoryMachine(RuleBasedStateMachine):
     @rule(frizz=st.floats(0, 1))
     def coat(self, frizz):
         groom = self.states[self.cursor].grooms[0]
-        self._commit(self.states[self.cursor].replace(grooms=(groom.replace(coat=groom.coat.replace(frizz=frizz)),)))
+        coat = groom.coat.replace(frizz=constant(frizz))
+        self._commit(self.states[self.cursor].replace(grooms=(groom.replace(coat=coat),)))
 
     def _commit(self, state):
         self.history.commit("Step", state)

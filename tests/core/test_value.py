@@ -6,7 +6,9 @@ import pytest
 
 from core.curve import Curve, Key, curve_at
 from core.errors import UserError
-from core.value import Constant, Formula, Value, constant, evaluate, formula, names_used
+from core.expression import ExpressionError
+from core.field import Field
+from core.value import Constant, Formula, Value, constant, evaluate, evaluate_within, formula, names_used
 
 CURVE = Curve(keys=(Key(frame=1001.0, value=0.0), Key(frame=1010.0, value=1.0)))
 
@@ -72,3 +74,19 @@ def test_result_is_always_finite():
     fields = {"m": np.array([np.nan, np.inf, 1e300])}
     assert np.array_equal(evaluate(constant(1e20, "m"), 0, fields), [0, 1e30, 1e30])
     assert np.isfinite(evaluate(constant(1e300))).all()
+
+
+def test_a_described_value_is_held_in_its_range_and_its_faults_name_the_field():
+    known = Field("Clump", "Only for this test, from nothing to all.", hard=(0.0, 1.0))
+    assert evaluate_within(formula("frame"), known, 7.0) == 1.0
+    assert evaluate_within(formula("-frame"), known, 7.0) == 0.0
+    assert isinstance(evaluate_within(constant(0.25), known), float)
+    column = evaluate_within(formula("u * 2"), known, 0.0, {"u": np.array([-1.0, 0.25, 3.0])})
+    assert column.dtype == np.float32
+    assert column.tolist() == [0.0, 0.5, 1.0]
+    with pytest.raises(UserError, match="Clump: Column 5 of the expression: there is no value named 'w'"):
+        evaluate_within(formula("1 + w"), known)
+    with pytest.raises(UserError, match=r"Clump: Column 4 of the expression: [^\n]+$"):
+        formula("1 +", label="Clump")
+    with pytest.raises(ExpressionError):
+        formula("1 +")

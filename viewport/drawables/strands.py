@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.random import rand
-from viewport.scene import Coat, Look
+from viewport.scene import Coat, mean_width
 from viewport.shaders import program, set_uniforms
 from viewport.strand_textures import StrandTextures
 
@@ -46,12 +46,9 @@ def strand_tints(coat: Coat) -> NDArray[np.float32]:
     out[:, 3] = 0.75 + 0.5 * rand(ids, 14)
     if coat.tints is not None:
         out[:, :3] *= coat.tints
+    if coat.widths is not None:
+        out[:, 3] *= coat.widths
     return out
-
-
-def mean_width(look: Look) -> float:
-    """Mean diameter in metres along a hair: the taper goes with the square of the way from the root."""
-    return look.root_width + (look.tip_width - look.root_width) / 3.0
 
 
 class CoatDrawable:
@@ -75,7 +72,7 @@ class CoatDrawable:
     def _tints_differ(self, coat: Coat) -> bool:
         mine = self.coat
         return (
-            mine.ids is not coat.ids or mine.tints is not coat.tints
+            mine.ids is not coat.ids or mine.tints is not coat.tints or mine.widths is not coat.widths
             or mine.look.value_variation != coat.look.value_variation
             or mine.look.hue_variation != coat.look.hue_variation
         )

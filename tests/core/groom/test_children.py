@@ -69,7 +69,7 @@ def plainly(f: Fur) -> NDArray[np.float64]:
 @pytest.mark.parametrize("count", [16, 5])
 def test_it_is_the_mean_of_guides_turned_with_the_skin(count: int) -> None:
     f = fur(count)
-    f.children.set_length(np.linspace(0.5, 1.2, len(f.children)).astype(np.float32))
+    f.children.length = np.linspace(0.5, 1.2, len(f.children)).astype(np.float32)[f.children.ids]
     assert evaluate(f.children, f.points, f.normals) is None
     np.testing.assert_allclose(f.children.points.transpose(0, 2, 1), plainly(f), atol=3e-6)
 
@@ -151,6 +151,37 @@ def test_zero_shape_changes_nothing_and_roots_never_move() -> None:
         evaluate(f.children, f.points, f.normals, shape=shape)
         assert np.array_equal(plain[:, :, 0], f.children.points[:, :, 0])
         assert np.abs(f.children.points[:, :, 15] - plain[:, :, 15]).max() > 0.01
+
+
+def test_a_column_of_one_number_is_that_number_and_a_row_heeds_its_own() -> None:
+    f = fur()
+    count = len(f.children)
+    evaluate(f.children, f.points, f.normals, shape=Shape(0.0, 0.3, 7))
+    calm = f.children.points.copy()
+    evaluate(f.children, f.points, f.normals, shape=Shape(0.6, 0.3, 7))
+    clumped = f.children.points.copy()
+    alike = Shape(np.full(count, 0.6, np.float32), np.full(count, 0.3, np.float32), 7)
+    evaluate(f.children, f.points, f.normals, shape=alike)
+    assert np.array_equal(f.children.points, clumped)
+    every_third = f.children.ids % 3 == 0
+    evaluate(f.children, f.points, f.normals, shape=alike._replace(clump=np.where(every_third, 0.6, 0.0)))
+    assert np.array_equal(f.children.points[every_third], clumped[every_third])
+    assert np.array_equal(f.children.points[~every_third], calm[~every_third])
+    assert not np.array_equal(clumped[~every_third], calm[~every_third])
+    with pytest.raises(ValueError, match="one number for all"):
+        evaluate(f.children, f.points, f.normals, shape=Shape(np.zeros(3, np.float32)))
+
+
+def test_a_density_for_every_row_keeps_a_child_by_its_own() -> None:
+    f = fur()
+    evaluate(f.children, f.points, f.normals)
+    whole, count = f.children.baked(), len(f.children)
+    even = f.children.ids % 2 == 0
+    baked = f.children.baked(np.where(even, 0.5, 0.125).astype(np.float32))
+    wanted = [i for i in range(count) if i < (0.5 if i % 2 == 0 else 0.125) * count]
+    assert baked.ids.tolist() == wanted
+    for column, full in zip(baked, whole, strict=True):
+        assert np.array_equal(column, full[wanted])
 
 
 def test_clumped_tips_go_to_the_tip_of_the_strongest_guide_the_nearer_it_stands() -> None:
