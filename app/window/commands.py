@@ -1,0 +1,220 @@
+"""Commands: everything the program can do, by name. Menus, palette, keys, radial and buttons all run these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+
+from rapidfuzz import fuzz, process
+
+from core.camera import Camera
+from core.errors import UserError
+
+if TYPE_CHECKING:
+    from app.window.desk import Desk
+    from app.window.settings import Settings
+
+# what a command changes; only changes of the document are undo steps
+Touches = Literal["document", "history", "workspace", "file", "settings", "window"]
+# where its hotkey works: the same key may mean different things over different parts of the window
+Scope = Literal["everywhere", "viewport", "outliner"]
+
+MOST_RECENT = 20
+
+
+class Window(Protocol):
+    """What commands ask of the main window, beside its desk. Whatever asks for a file name asks the artist itself."""
+
+    desk: Desk
+    commands: Commands
+
+    @property
+    def settings(self) -> Settings:
+        """The preferences now."""
+        ...
+
+    @property
+    def playing(self) -> bool:
+        """True during playback."""
+        ...
+
+    def new_document(self) -> None: ...
+    def open_file(self, path: Path | None = None) -> None: ...
+    def show_recent(self) -> None: ...
+    def save(self) -> None: ...
+    def save_as(self) -> None: ...
+    def save_copy(self) -> None: ...
+    def import_mesh(self) -> None: ...
+    def reload_mesh(self) -> None: ...
+    def export_coat(self) -> None: ...
+    def save_screenshot(self) -> None: ...
+    def make_playblast(self) -> None: ...
+    def close(self) -> bool: ...
+
+    def look(self, camera: Camera) -> None: ...
+    def look_from(self, side: str) -> None: ...
+    def frame_all(self) -> None: ...
+    def frame_selected(self) -> None: ...
+    def toggle_projection(self) -> None: ...
+    def camera_from_file(self) -> None: ...
+    def choose_background(self) -> None: ...
+    def pin_reference(self) -> None: ...
+    def scale_density(self, factor: float) -> None: ...
+    def toggle_playback(self) -> None: ...
+
+    def toggle_panel(self, name: str) -> None: ...
+    def reset_layout(self) -> None: ...
+    def toggle_full_screen(self) -> None: ...
+    def restart_safe(self) -> None: ...
+    def show_palette(self) -> None: ...
+    def show_preferences(self) -> None: ...
+    def show_keymap_editor(self) -> None: ...
+    def show_console(self) -> None: ...
+    def change_settings(self, **changes: Any) -> None: ...
+
+    def save_macro(self) -> None: ...
+    def play_macro(self) -> None: ...
+
+
+def always(desk: Desk) -> str | None:
+    """For commands that can always run."""
+    return None
+
+
+class Command(NamedTuple):
+    """One thing the program can do.
+
+    name : "edit.undo"; what stands before the dot is its category.
+    label : words of menus and palette. tooltip : what, when, unit, in eight words or more.
+    twin : dotted name of the function that does the same without a window.
+    touches : what it changes. undo : name of the step it makes; given exactly when it touches the document.
+    enabled : None when it can run now, else the reason in words.
+    checked : for what is on or off, whether it is on now.
+    icon : file in resources/icons without suffix, or None for its label. scope : where its hotkey works.
+    words : further words the palette finds it by. repeats : runs again and again while its hotkey is held.
+    """
+
+    name: str
+    label: str
+    tooltip: str
+    run: Callable[[Window], object]
+    twin: str
+    touches: Touches = "workspace"
+    undo: str | None = None
+    enabled: Callable[[Desk], str | None] = always
+    checked: Callable[[Desk], bool] | None = None
+    icon: str | None = None
+    scope: Scope = "everywhere"
+    words: str = ""
+    repeats: bool = False
+
+    @property
+    def category(self) -> str:
+        """What stands before the dot, as a word."""
+        return self.name.split(".")[0].capitalize()
+
+
+class Commands:
+    """All commands of one window by name.
+
+    recent : names of those last used, newest first.
+    """
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self._table: dict[str, Command] = {}
+        self._haystack: list[str] = []
+        self.recent: list[str] = []
+
+    def __iter__(self) -> Iterator[Command]:
+        return iter(self._table.values())
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._table
+
+    def __getitem__(self, name: str) -> Command:
+        return self._table[name]
+
+    @property
+    def desk(self) -> Desk:
+        """The desk commands work at."""
+        return self._window.desk
+
+    def add(self, table: Iterable[Command]) -> None:
+        """Add commands; ValueError for a name that is taken."""
+        for command in table:
+            if command.name in self._table:
+                raise ValueError(f"there are two commands {command.name}")
+            self._table[command.name] = command
+            self._haystack.append(f"{command.label} {command.category} {command.words}".lower())
+
+    def reason(self, name: str) -> str | None:
+        """Why the command cannot run now, or None when it can."""
+        return self._table[name].enabled(self._window.desk)
+
+    def run(self, name: str) -> bool:
+        """Run a command. False when it could not; the artist is told why."""
+        command = self._table[name]
+        reason = command.enabled(self._window.desk)
+        if reason is not None:
+            self._window.desk.said.emit(reason)
+            return False
+        self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
+        try:
+            command.run(self._window)
+        except UserError as error:
+            self._window.desk.error(error)
+            return False
+        return True
+
+    def find(self, words: str) -> list[Command]:
+        """Commands by words in any order, whole, begun or mistyped, best first; without words the last used first."""
+        commands = list(self._table.values())
+        if not words.strip():
+            order = {name: place for place, name in enumerate(self.recent)}
+            return sorted(commands, key=lambda c: order.get(c.name, len(order)))
+        scores = [0.0] * len(commands)
+        for word in words.lower().split():
+            for place, score in enumerate(_scores(word, self._haystack)):
+                scores[place] += score if score >= 70.0 else -200.0
+        good = [(score, c) for score, c in zip(scores, commands, strict=True) if score > 0.0]
+        fresh = {name: len(self.recent) - place for place, name in enumerate(self.recent)}
+        good.sort(key=lambda pair: (-pair[0], -fresh.get(pair[1].name, 0), len(pair[1].label)))
+        return [command for _, command in good]
+
+
+def _scores(word: str, haystack: list[str]) -> list[float]:
+    """How well one typed word fits each text, 0 .. 130; a text's own words count most from their beginning."""
+    fuzzy = process.cdist([word], haystack, scorer=fuzz.partial_ratio)[0]
+    scores = []
+    for text, rough in zip(haystack, fuzzy, strict=True):
+        padded = f" {text} "
+        if f" {word} " in padded:
+            scores.append(130.0 if text.startswith(word) else 120.0)
+        elif f" {word}" in padded:
+            scores.append(115.0 if text.startswith(word) else 110.0)
+        elif word in text:
+            scores.append(90.0)
+        else:
+            # a short word is found inside any text by chance
+            scores.append(float(rough) - 15.0 if len(word) > 3 else 0.0)
+    return scores
+
+
+def switch(name: str) -> Callable[[Window], None]:
+    """A run that turns one of the view's options on or off."""
+
+    def run(window: Window) -> None:
+        view = window.desk.session.workspace.view
+        window.desk.set_workspace(view=view.replace(**{name: not getattr(view, name)}))
+
+    return run
+
+
+def is_on(name: str) -> Callable[[Desk], bool]:
+    """Whether one of the view's options is on."""
+    return lambda desk: bool(getattr(desk.session.workspace.view, name))

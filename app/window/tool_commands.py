@@ -1,0 +1,110 @@
+"""Commands of the hand: every tool of the registry, what brushes share, and what all tools respect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from app.window.commands import Command, Window
+from core.falloff import SHAPES
+from tools.registry import Registry
+from tools.tool import BrushParams, Tool
+
+if TYPE_CHECKING:
+    from app.window.desk import Desk
+
+LARGER = 1.15  # one press of the key
+STRONGER = 0.05
+_CHOOSE = "tools.session.Session.choose"
+_RESPECT = "core.workspace.Respect"
+
+
+def _needs_brush(desk: Desk) -> str | None:
+    params = desk.session.tool.params
+    return None if isinstance(params, BrushParams) else f"{desk.session.tool.label} has no ring."
+
+
+def _change(field: str, change: Callable[[Any], Any]) -> Callable[[Window], None]:
+    """A run that changes one setting of the active tool."""
+
+    def run(window: Window) -> None:
+        tool = window.desk.session.tool
+        window.desk.choose(tool.name, **{field: change(getattr(tool.params, field))})
+
+    return run
+
+
+def _next_falloff(shape: str) -> str:
+    places = list(SHAPES)
+    return places[(places.index(shape) + 1) % len(places)] if shape in places else places[0]
+
+
+def _respects(field: str) -> Callable[[Window], None]:
+    def run(window: Window) -> None:
+        respect = window.desk.session.workspace.respect
+        window.desk.set_workspace(respect=respect.replace(**{field: not getattr(respect, field)}))
+
+    return run
+
+
+def _is_respected(field: str) -> Callable[[Desk], bool]:
+    return lambda desk: bool(getattr(desk.session.workspace.respect, field))
+
+
+def _choose(name: str) -> Callable[[Window], None]:
+    return lambda window: window.desk.choose(name)
+
+
+def _is_chosen(name: str) -> Callable[[Desk], bool]:
+    return lambda desk: desk.session.tool.name == name
+
+
+def tool_command(tool: type[Tool[Any]]) -> Command:
+    """The command that takes a tool into the hand."""
+    return Command(
+        f"tool.{tool.name}", tool.label, tool.tooltip, _choose(tool.name), _CHOOSE, checked=_is_chosen(tool.name),
+        icon=tool.icon, scope="viewport", words="tool brush")
+
+
+def tool_commands(registry: Registry) -> tuple[Command, ...]:
+    """A command for every tool there is."""
+    return tuple(tool_command(tool) for tool in registry)
+
+
+HAND: tuple[Command, ...] = (
+    Command(
+        "tool.larger", "Larger brush", "Makes the ring of the brush 15 percent larger, in pixels or on the skin.",
+        _change("size", lambda v: min(v * LARGER, 4000.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        repeats=True, words="size radius bigger increase"),
+    Command(
+        "tool.smaller", "Smaller brush", "Makes the ring of the brush 13 percent smaller, in pixels or on the skin.",
+        _change("size", lambda v: max(v / LARGER, 1.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        repeats=True, words="size radius decrease"),
+    Command(
+        "tool.stronger", "Stronger brush", "Adds 0.05 to the strength of the brush, at most to 1.",
+        _change("strength", lambda v: min(v + STRONGER, 1.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        repeats=True, words="strength more increase"),
+    Command(
+        "tool.weaker", "Weaker brush", "Takes 0.05 from the strength of the brush, at least to 0.",
+        _change("strength", lambda v: max(v - STRONGER, 0.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        repeats=True, words="strength less decrease"),
+    Command(
+        "tool.falloff", "Next falloff", "Goes through the ways the brush fades from its middle to its rim.",
+        _change("falloff", _next_falloff), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        words="cycle shape soft hard"),
+    Command(
+        "tool.world_size", "Brush size on the skin",
+        "Keeps the ring the same size on the skin when you zoom; off keeps it in pixels.",
+        _change("world", lambda on: not on), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        checked=lambda desk: bool(getattr(desk.session.tool.params, "world", False)), words="units screen pixels"),
+    Command(
+        "tool.symmetry", "Symmetry X", "Makes every stroke on the other side of the animal too, across its X = 0.",
+        _respects("symmetry"), _RESPECT, checked=_is_respected("symmetry"), icon="symmetry", scope="viewport",
+        words="mirror both sides"),
+    Command(
+        "tool.respect_hairspray", "Respect hairspray", "Lets sprayed hair hold its shape under every tool.",
+        _respects("hairspray"), _RESPECT, checked=_is_respected("hairspray"), icon="hairspray", words="hold lock"),
+    Command(
+        "tool.respect_selection", "Respect the selection", "Lets tools edit only selected guides while there are any.",
+        _respects("selection"), _RESPECT, checked=_is_respected("selection"), icon="select", words="mask only"),
+)

@@ -1,0 +1,91 @@
+"""Commands of the window itself: panels, theme, dialogs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from app.window.commands import Command, Window
+
+if TYPE_CHECKING:
+    from app.window.desk import Desk
+
+# name of a panel in Workspace.panels -> its title and what it is for
+PANELS = {
+    "shelf": ("Tools", "Shows or hides the shelf of tools at the left of the window."),
+    "scene": ("Scene", "Shows or hides the list of meshes and grooms at the right."),
+    "tool": ("Tool settings", "Shows or hides the settings of the tool in your hand."),
+    "respect": ("Respect", "Shows or hides what tools heed: hairspray, selection and symmetry."),
+    "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
+    "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
+    "history": ("History", "Shows or hides the list of steps that undo goes through."),
+    "timeline": ("Timeline", "Shows or hides frames and playback at the bottom of the window."),
+}
+TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels
+_SETTINGS = "app.window.settings.save_settings"
+_WORKSPACE = "core.workspace.Workspace"
+
+
+def _toggle(panel: str) -> Callable[[Window], None]:
+    return lambda window: window.toggle_panel(panel)
+
+
+def _visible(panel: str) -> Callable[[Desk], bool]:
+    return lambda desk: panel in desk.session.workspace.panels
+
+
+def _theme(window: Window) -> None:
+    window.change_settings(theme="light" if window.settings.theme == "dark" else "dark")
+
+
+def _text(direction: int) -> Callable[[Window], None]:
+    def run(window: Window) -> None:
+        size = window.settings.text_size
+        further = [s for s in TEXT_SIZES[::direction] if (s - size) * direction > 0]
+        if further:
+            window.change_settings(text_size=further[0])
+
+    return run
+
+
+WINDOW: tuple[Command, ...] = (
+    *(
+        Command(
+            f"window.{name}", f"{label} panel", tooltip, _toggle(name), _WORKSPACE, checked=_visible(name),
+            words="show hide dock")
+        for name, (label, tooltip) in PANELS.items()
+    ),
+    Command(
+        "window.palette", "Find a command…", "Finds any command by words, shows its hotkey and runs it.",
+        lambda w: w.show_palette(), "app.window.commands.Commands.find", "window", icon="search",
+        words="search palette help"),
+    Command(
+        "window.theme", "Dark / light theme", "Switches between the dark and the light colours of the window.",
+        _theme, _SETTINGS, "settings", words="colour appearance"),
+    Command(
+        "window.text_larger", "Larger text", "Makes all text of the window one step larger, in pixels.",
+        _text(1), _SETTINGS, "settings", words="font size bigger zoom"),
+    Command(
+        "window.text_smaller", "Smaller text", "Makes all text of the window one step smaller, in pixels.",
+        _text(-1), _SETTINGS, "settings", words="font size"),
+    Command(
+        "window.preferences", "Preferences…", "Theme, text, pen, units, memory for undo and where autosaves lie.",
+        lambda w: w.show_preferences(), _SETTINGS, "window", icon="preferences", words="settings options pen"),
+    Command(
+        "window.keymap", "Hotkeys…", "Shows every hotkey, and lets you press another one for a command.",
+        lambda w: w.show_keymap_editor(), "app.window.keymap.Keymap.assigned", "window", icon="keyboard",
+        words="keymap shortcuts keys blender maya houdini"),
+    Command(
+        "window.console", "Python console", "Types Python at the open document; what it edits can be undone.",
+        lambda w: w.show_console(), "app.commands.run.command", "window", icon="console", words="script code terminal"),
+    Command(
+        "window.reset_layout", "Reset the layout", "Puts every panel back where it is in a new installation.",
+        lambda w: w.reset_layout(), _WORKSPACE, words="panels docks default"),
+    Command(
+        "window.full_screen", "Full screen", "Fills the whole screen with the window; again brings the frame back.",
+        lambda w: w.toggle_full_screen(), _WORKSPACE, "window", words="maximize"),
+    Command(
+        "window.safe_mode", "Restart without plug-ins",
+        "Saves your state for recovery and starts again without a studio's own tools.",
+        lambda w: w.restart_safe(), "tools.registry.Registry", "window", words="safe mode plugins broken"),
+)

@@ -1,0 +1,55 @@
+"""What a hand does to the things of the scene: which one is meant, hidden or shown."""
+
+from __future__ import annotations
+
+from core.document import Document, MeshObject, find_groom, find_mesh, with_mesh
+from core.workspace import Workspace
+
+
+def active_mesh(document: Document, workspace: Workspace) -> MeshObject | None:
+    """The mesh the artist is at: the one under the groom that tools edit, else the first; None without meshes."""
+    if any(groom.id == workspace.groom for groom in document.grooms):
+        return find_mesh(document, find_groom(document, workspace.groom or 0).mesh_id)
+    if document.grooms:
+        return find_mesh(document, document.grooms[0].mesh_id)
+    return document.meshes[0] if document.meshes else None
+
+
+def hide_mesh(document: Document, mesh_id: int) -> Document:
+    """The document with that mesh hidden, and with it the grooms that grow on it; UserError when there is none."""
+    item = find_mesh(document, mesh_id)
+    return document if item.hidden else with_mesh(document, item.replace(hidden=True))
+
+
+def show_all(document: Document) -> Document:
+    """The document with nothing hidden."""
+    if not any(item.hidden for item in document.meshes):
+        return document
+    return document.replace(meshes=tuple(m.replace(hidden=False) if m.hidden else m for m in document.meshes))
+
+
+def isolated(document: Document, workspace: Workspace) -> Workspace:
+    """The workspace that shows only the mesh the artist is at, with its grooms; everything when it did already."""
+    item, view = active_mesh(document, workspace), workspace.view
+    alone = () if item is None or view.isolated == (item.id,) else (item.id,)
+    result: Workspace = workspace.replace(view=view.replace(isolated=alone))
+    return result
+
+
+def ghosted(document: Document, workspace: Workspace) -> Workspace:
+    """The workspace that shows the mesh the artist is at translucent; solid again when it was."""
+    item, view = active_mesh(document, workspace), workspace.view
+    if item is None:
+        return workspace
+    others = tuple(i for i in view.ghosted if i != item.id)
+    result: Workspace = workspace.replace(
+        view=view.replace(ghosted=others if item.id in view.ghosted else (*others, item.id)))
+    return result
+
+
+def stored_bookmark(workspace: Workspace, name: str) -> Workspace:
+    """The workspace with the view's camera kept under a name; unchanged before there is a view."""
+    if not workspace.cameras:
+        return workspace
+    result: Workspace = workspace.replace(bookmarks={**workspace.bookmarks, name: workspace.cameras[0]})
+    return result
