@@ -22,7 +22,7 @@ SAME_SIDE = 0.2  # least cosine between the old normal and the new one
 OFFSETS = (0.0, 0.0025, 0.01, 0.03)  # of the diagonal, along the old normal, to leave the wrong side of thin skin
 
 
-class Rebound(IntEnum):
+class RebindMethod(IntEnum):
     """How a root found its new place, from the surest to the least."""
 
     TOPOLOGY = 0
@@ -39,7 +39,7 @@ def rebind_roots(
     Returns
     -------
     roots : on the new mesh, in the same order, with rest frames of the new mesh.
-    method : (N,) uint8, a `Rebound` for each.
+    method : (N,) uint8, a `RebindMethod` for each.
     error : (N,) float32, metres between the place on the old mesh at rest and that on the new one; for the same
         topology the roots have not slid on the skin, whatever its shape, and the error is 0.
 
@@ -54,13 +54,13 @@ def rebind_roots(
     if np.array_equal(old_mesh.counts, new_mesh.counts) and np.array_equal(old_mesh.corners, new_mesh.corners):
         frames = root_frames(old_mesh, roots, new_mesh.points)
         kept = Roots(faces=roots.faces, corners=roots.corners, weights=roots.weights, uvs=roots.uvs, frames=frames)
-        return kept, np.full(count, Rebound.TOPOLOGY, np.uint8), np.zeros(count, np.float32)
+        return kept, np.full(count, RebindMethod.TOPOLOGY, np.uint8), np.zeros(count, np.float32)
 
     places = root_positions(old_mesh, roots)
     triangles = triangulate(new_mesh)
     triangle = np.full(count, -1, np.int32)
     weights = np.zeros((count, 3), np.float32)
-    method = np.full(count, Rebound.UV, np.uint8)
+    method = np.full(count, RebindMethod.UV, np.uint8)
     if old_mesh.uvs is not None and new_mesh.uvs is not None:
         triangle, weights = _by_uv(roots.uvs, places, new_mesh, triangles)
     rows = np.flatnonzero(triangle < 0)
@@ -138,7 +138,7 @@ def _by_place(
     triangle, weights, _ = closest_points(bvh, places)
     if (triangle < 0).any():
         raise UserError("The roots cannot be bound to the new mesh: none of its faces has finite coordinates.")
-    method = np.full(len(places), Rebound.CLOSEST_ANY, np.uint8)
+    method = np.full(len(places), RebindMethod.CLOSEST_ANY, np.uint8)
     rows = np.arange(len(places))
     for offset in OFFSETS:
         outside = (places[rows] + normals[rows] * np.float32(offset * diagonal)).astype(np.float32)
@@ -147,7 +147,7 @@ def _by_place(
         there /= np.maximum(np.linalg.norm(there, axis=1), 1e-12)[:, None]
         same = (there * normals[rows]).sum(1) > SAME_SIDE
         triangle[rows[same]], weights[rows[same]] = hit[same], bary[same]
-        method[rows[same]] = Rebound.CLOSEST
+        method[rows[same]] = RebindMethod.CLOSEST
         rows = rows[~same]
         if not len(rows):
             break

@@ -3,7 +3,7 @@ import pytest
 
 from core.errors import UserError
 from core.mesh.mesh import Mesh
-from core.mesh.rebind import Rebound, rebind_roots
+from core.mesh.rebind import RebindMethod, rebind_roots
 from core.mesh.roots import Roots
 from core.mesh.scatter import scatter
 from core.mesh.surface import place_roots, root_positions
@@ -36,7 +36,7 @@ def test_the_same_topology_keeps_every_root() -> None:
     old, new = _sheet(8, True), _sheet(8, True, height=0.3)
     roots = _roots(old)
     moved, method, error = rebind_roots(roots, old, new)
-    assert (method == Rebound.TOPOLOGY).all()
+    assert (method == RebindMethod.TOPOLOGY).all()
     assert (error == 0).all()
     np.testing.assert_array_equal(moved.weights, roots.weights)
     np.testing.assert_allclose(root_positions(new, moved)[:, [0, 2]], root_positions(old, roots)[:, [0, 2]], atol=1e-6)
@@ -49,7 +49,7 @@ def test_uvs_find_the_place_on_another_tessellation_however_it_has_moved() -> No
     new = new.replace(points=new.points + np.float32([5, 1, 0]))
     roots = _roots(old)
     moved, method, error = rebind_roots(roots, old, new)
-    assert (method == Rebound.UV).all()
+    assert (method == RebindMethod.UV).all()
     np.testing.assert_allclose(root_positions(new, moved) - [5, 1, 0], root_positions(old, roots), atol=2e-6)
     np.testing.assert_allclose(error, np.sqrt(26), rtol=1e-5)
     np.testing.assert_allclose(moved.uvs, roots.uvs, atol=1e-6)
@@ -59,7 +59,7 @@ def test_mirrored_halves_sharing_uvs_keep_their_sides() -> None:
     old, new = _sheet(8, True, mirrored=True), _sheet(12, True, mirrored=True)
     roots = _roots(old)
     moved, method, error = rebind_roots(roots, old, new)
-    assert (method == Rebound.UV).mean() > 0.99
+    assert (method == RebindMethod.UV).mean() > 0.99
     assert error.max() < 1e-4
     np.testing.assert_allclose(root_positions(new, moved), root_positions(old, roots), atol=1e-4)
 
@@ -76,7 +76,7 @@ def test_without_uvs_the_closest_place_that_faces_the_same_way() -> None:
         parts=np.concatenate([upper.parts, lower.parts]), part_names=("plate",),
     )
     moved, method, error = rebind_roots(_roots(old), old, new)
-    assert (method == Rebound.CLOSEST).all()
+    assert (method == RebindMethod.CLOSEST).all()
     assert (moved.faces < len(upper.counts)).all()
     np.testing.assert_allclose(error, 0.002, atol=1e-5)
 
@@ -86,7 +86,7 @@ def test_where_nothing_faces_the_same_way_it_says_so() -> None:
     new = _sheet(5, False)
     new = new.replace(corners=new.corners.reshape(-1, 4)[:, ::-1].copy().ravel())
     moved, method, error = rebind_roots(_roots(old, 50), old, new)
-    assert (method == Rebound.CLOSEST_ANY).all()
+    assert (method == RebindMethod.CLOSEST_ANY).all()
     assert error.max() < 1e-6
     assert len(moved.faces) == 50
 
@@ -98,9 +98,9 @@ def test_roots_outside_every_island_go_by_place() -> None:
     roots = _roots(old)
     _, method, error = rebind_roots(roots, old, new)
     right = root_positions(old, roots)[:, 0] > 0.5
-    assert (method[right] == Rebound.CLOSEST).all()
+    assert (method[right] == RebindMethod.CLOSEST).all()
     assert error[right].max() < 1e-5
-    assert (method[~right] == Rebound.UV).all()
+    assert (method[~right] == RebindMethod.UV).all()
 
 
 def test_an_empty_mesh_is_refused() -> None:
