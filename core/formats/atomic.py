@@ -52,7 +52,7 @@ def atomic_write(path: str | os.PathLike[str], keep_previous: bool = False) -> I
                 _keep(target)
         os.replace(temp, target)
         replaced = True
-        _sync_folder(target.parent)
+        sync_folder(target.parent)
     except BaseException as error:
         if temp is not None and not replaced:
             with suppress(OSError):
@@ -118,7 +118,8 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder safe on disk, where its file system can do that."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -30,6 +30,7 @@ import platformdirs
 from core.document import Document
 from core.errors import UserError
 from core.formats.arrays import ArrayHashes, raw_bytes, spec_of
+from core.formats.atomic import sync_folder
 from core.formats.tree import encode_tree
 from core.leaves import Path as LeafPath
 from core.leaves import leaves
@@ -184,7 +185,7 @@ class Journal:
             if current.exists():
                 os.replace(current, f"{base}{PREVIOUS}")
             os.replace(unfinished, current)
-            _sync_folder(self.folder)
+            sync_folder(self.folder)
         except BaseException:
             with suppress(OSError):
                 file.close()
@@ -255,14 +256,6 @@ def _append(file: IO[bytes], buffers: Iterable[Any]) -> None:
         file.write(buffer)
     file.flush()
     os.fsync(file.fileno())
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def remove_journal(folder: Path, token: str) -> None:
