@@ -23,7 +23,10 @@ class Surface(NamedTuple):
     points : (V, 3) float32. normals : (V, 3) float32, unit. triangles : (T, 3) int32.
     color : linear RGB of the skin; under a coat take :func:`skin_under`.
     values : (V,) float32 or None, a map to be shown as colours, 0 .. 1.
-    ghost : drawn translucent.
+    ghost : drawn translucent, over what is behind it.
+    edges : (E, 2) int32 or None, the lines of a wire picture: the edges of the polygons, without the diagonals that
+        triangulation added. Without them all edges of the triangles are drawn.
+    covered : under a coat, where little light of the sky arrives; None for wherever the scene has coats.
     """
 
     points: np.ndarray
@@ -32,6 +35,8 @@ class Surface(NamedTuple):
     color: Color = (0.36, 0.35, 0.34)
     values: np.ndarray | None = None
     ghost: bool = False
+    edges: np.ndarray | None = None
+    covered: bool | None = None
 
 
 class Look(NamedTuple):
@@ -79,13 +84,18 @@ class Coat(NamedTuple):
 class GuideLines(NamedTuple):
     """Guides as lines of constant width in pixels.
 
-    points : (G, P, 3) or (G, 3, P) float32. states : (G,) uint8, indices into `colors`.
+    points : (G, P, 3) or (G, 3, P) float32. states : (G,) uint8, indices into `colors`: plain, selected, frozen,
+    sprayed, trouble. normals : (G, 3) float32 of the skin at the roots, or None when all guides are drawn from all
+    sides.
     """
 
     points: np.ndarray
     states: np.ndarray
-    colors: tuple[Color, ...] = ((0.74, 0.39, 0.10), (1.0, 0.86, 0.55), (0.25, 0.45, 0.75))
+    colors: tuple[Color, ...] = (
+        (0.74, 0.39, 0.10), (1.0, 0.86, 0.55), (0.25, 0.45, 0.75), (0.20, 0.60, 0.42), (0.85, 0.09, 0.07)
+    )
     pixels: float = 1.5
+    normals: np.ndarray | None = None
 
 
 class Lights(NamedTuple):
