@@ -10,7 +10,7 @@ from numba import njit, types
 from numpy.typing import NDArray
 
 from core.errors import UserError
-from core.formats.text_numbers import BYTES, POWERS, parse_number, text_bytes
+from core.formats.text_numbers import BYTES, POWERS, end_of_line, next_word, parse_number, text_bytes
 from core.mesh.mesh import Mesh
 from core.mesh.polygons import Polygons
 
@@ -103,11 +103,7 @@ def _count(data):  # type: ignore[no-untyped-def]
     size = len(data)
     at = 0
     while at < size:
-        while at < size and data[at] <= 32:
-            at += 1
-        word = at
-        while at < size and data[at] > 32:
-            at += 1
+        word, at = next_word(data, at, size)
         length = at - word
         c = data[word] if length else 0
         if length == 1 and c == 118:
@@ -129,8 +125,7 @@ def _count(data):  # type: ignore[no-untyped-def]
             names += 1
         elif length == 1 and c in (108, 112):
             wires += 1
-        while at < size and data[at] != 10 and data[at] != 13:
-            at += 1
+        at = end_of_line(data, at)
     return vertices, texcoords, faces, corners, names, wires
 
 
@@ -148,24 +143,14 @@ def _read(data, powers, points, uvs, counts, corner_vertex, corner_uv, statement
     size = len(data)
     at = 0
     while at < size:
-        while at < size and data[at] <= 32:
-            at += 1
-        word = at
-        while at < size and data[at] > 32:
-            at += 1
+        word, at = next_word(data, at, size)
         length = at - word
         c = data[word] if length else 0
-        end = at
-        while end < size and data[end] != 10 and data[end] != 13:
-            end += 1
+        end = end_of_line(data, at)
         if (length == 1 and c == 118) or (length == 2 and c == 118 and data[word + 1] == 116):
             wanted = 3 if length == 1 else 2
             for axis in range(wanted):
-                while at < end and data[at] <= 32:
-                    at += 1
-                start = at
-                while at < end and data[at] > 32:
-                    at += 1
+                start, at = next_word(data, at, end)
                 value = parse_number(data, start, at, powers)
                 if length == 1:
                     points[vertices, axis] = value

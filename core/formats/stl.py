@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit, types
 
 from core.errors import UserError
-from core.formats.text_numbers import BYTES, POWERS, parse_number, text_bytes
+from core.formats.text_numbers import BYTES, POWERS, end_of_line, next_word, parse_number, text_bytes
 from core.mesh.mesh import Mesh
 from core.mesh.polygons import Polygons
 from core.mesh.triangulate import triangulate
@@ -89,15 +89,10 @@ def _read_vertices(data, powers, points):  # type: ignore[no-untyped-def]
     found = 0
     at = 0
     while at < size:
-        while at < size and data[at] <= 32:
-            at += 1
-        start = at
-        while at < size and data[at] > 32:
-            at += 1
+        start, at = next_word(data, at, size)
         last = at - start - 1
         if last in (4, 7) and data[start + last] | 32 == 100 and data[start + last - 4] | 32 == 115:
-            while at < size and data[at] != 10 and data[at] != 13:  # "solid" and "endsolid" are followed by a name
-                at += 1
+            at = end_of_line(data, at)  # "solid" and "endsolid" are followed by a name
             continue
         is_vertex = (
             at - start == 6 and data[start] | 32 == 118 and data[start + 1] | 32 == 101 and data[start + 2] | 32 == 114
@@ -105,11 +100,7 @@ def _read_vertices(data, powers, points):  # type: ignore[no-untyped-def]
         )  # fmt: skip
         if is_vertex and found < len(points):
             for axis in range(3):
-                while at < size and data[at] <= 32:
-                    at += 1
-                start = at
-                while at < size and data[at] > 32:
-                    at += 1
+                start, at = next_word(data, at, size)
                 points[found, axis] = parse_number(data, start, at, powers)
             found += 1
     return found

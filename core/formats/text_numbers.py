@@ -113,6 +113,25 @@ def parse_number(data, start, stop, powers):  # type: ignore[no-untyped-def]
     return sign * value
 
 
+@njit(types.UniTuple(types.int64, 2)(BYTES, types.int64, types.int64), cache=True, nogil=True)  # type: ignore[no-untyped-call]
+def next_word(data, at, end):  # type: ignore[no-untyped-def]
+    """Where the first word in data[at:end] starts and stops; both `end` when there is none."""
+    while at < end and data[at] <= 32:
+        at += 1
+    start = at
+    while at < end and data[at] > 32:
+        at += 1
+    return start, at
+
+
+@njit(types.int64(BYTES, types.int64), cache=True, nogil=True)
+def end_of_line(data, at):  # type: ignore[no-untyped-def]
+    """The first line feed or carriage return at or behind `at`, or the end."""
+    while at < len(data) and data[at] != 10 and data[at] != 13:
+        at += 1
+    return at
+
+
 @njit(types.int64(BYTES), cache=True, nogil=True)
 def _count_words(data):  # type: ignore[no-untyped-def]
     count = 0

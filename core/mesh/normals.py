@@ -65,16 +65,21 @@ def _polygon_vertex_normals(
     return normals
 
 
+@njit(cache=True, inline="always")
+def edge(points, a, b):  # type: ignore[no-untyped-def]
+    """From point a to point b, in float64."""
+    return (
+        np.float64(points[b, 0]) - points[a, 0], np.float64(points[b, 1]) - points[a, 1],
+        np.float64(points[b, 2]) - points[a, 2],
+    )  # fmt: skip
+
+
 @njit(types.void(F32_2D, I32_2D, types.float32[:, ::1], types.float64[::1]), cache=True, nogil=True)
 def _faces(points, triangles, normals, areas):  # type: ignore[no-untyped-def]
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        ux = np.float64(points[b, 0]) - points[a, 0]
-        uy = np.float64(points[b, 1]) - points[a, 1]
-        uz = np.float64(points[b, 2]) - points[a, 2]
-        vx = np.float64(points[c, 0]) - points[a, 0]
-        vy = np.float64(points[c, 1]) - points[a, 1]
-        vz = np.float64(points[c, 2]) - points[a, 2]
+        ux, uy, uz = edge(points, a, b)
+        vx, vy, vz = edge(points, a, c)
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         length = math.sqrt(x * x + y * y + z * z)
         areas[t] = 0.5 * length
@@ -106,12 +111,8 @@ def _gather_polygons(points, counts, corners, total):  # type: ignore[no-untyped
                 v = corners[start + k]
                 p = corners[start + (k - 1 if k > 0 else n - 1)]
                 q = corners[start + (k + 1 if k < n - 1 else 0)]
-                ax = np.float64(points[p, 0]) - points[v, 0]
-                ay = np.float64(points[p, 1]) - points[v, 1]
-                az = np.float64(points[p, 2]) - points[v, 2]
-                bx = np.float64(points[q, 0]) - points[v, 0]
-                by = np.float64(points[q, 1]) - points[v, 1]
-                bz = np.float64(points[q, 2]) - points[v, 2]
+                ax, ay, az = edge(points, v, p)
+                bx, by, bz = edge(points, v, q)
                 cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
                 angle = math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), ax * bx + ay * by + az * bz)
                 total[v, 0] += angle * x

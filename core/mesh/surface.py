@@ -9,7 +9,7 @@ from numba import njit, types
 from numpy.typing import NDArray
 
 from core.mesh.mesh import Mesh, Triangles
-from core.mesh.normals import mesh_normals
+from core.mesh.normals import edge, mesh_normals
 from core.mesh.roots import Roots
 
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
@@ -212,12 +212,8 @@ def _normal_at(points, normals, vertices, weights, i, fx, fy, fz):  # type: igno
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     if length < 1e-6:
         a, b, c = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        ux = np.float64(points[b, 0]) - points[a, 0]
-        uy = np.float64(points[b, 1]) - points[a, 1]
-        uz = np.float64(points[b, 2]) - points[a, 2]
-        vx = np.float64(points[c, 0]) - points[a, 0]
-        vy = np.float64(points[c, 1]) - points[a, 1]
-        vz = np.float64(points[c, 2]) - points[a, 2]
+        ux, uy, uz = edge(points, a, b)
+        vx, vy, vz = edge(points, a, c)
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         length = math.sqrt(nx * nx + ny * ny + nz * nz)
         if length == 0.0:
@@ -264,12 +260,8 @@ def _deformed_frames(rest, points, normals, vertices, weights, stored, frames): 
         px, py, pz = np.float64(stored[i, 0, 0]), np.float64(stored[i, 0, 1]), np.float64(stored[i, 0, 2])
         nx, ny, nz = _normal_at(points, normals, vertices, weights, i, mx, my, mz)
         a, b, c = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        ux = np.float64(rest[b, 0]) - rest[a, 0]
-        uy = np.float64(rest[b, 1]) - rest[a, 1]
-        uz = np.float64(rest[b, 2]) - rest[a, 2]
-        vx = np.float64(rest[c, 0]) - rest[a, 0]
-        vy = np.float64(rest[c, 1]) - rest[a, 1]
-        vz = np.float64(rest[c, 2]) - rest[a, 2]
+        ux, uy, uz = edge(rest, a, b)
+        vx, vy, vz = edge(rest, a, c)
         # the stored tangent, dropped along its normal onto the rest triangle, in the triangle's two edges
         cx, cy, cz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         area2 = cx * cx + cy * cy + cz * cz
