@@ -90,29 +90,40 @@ class CoatBinding:
         """The binding as it stands."""
         return self._sites.binding()
 
+    def serves(self, guides: Guides) -> bool:
+        """True when the binding is that of these very roots."""
+        return guides.ids is self._ids and guides.roots is self._roots
+
+    @property
+    def edited(self) -> bool:
+        """True when guides were planted or deleted since everything was bound: a little off what binding anew gives."""
+        return self._sites.edits > 0
+
+    def edits_to(self, guides: Guides) -> int | None:
+        """How many guides must be added and taken away to serve these; None when only binding anew will do."""
+        gone, kept, new = self._difference(guides)
+        count = len(gone) + len(new)
+        stays = (
+            count <= MOST_EDITS
+            and len(kept) > 0
+            and self._sites.edits + count <= max(MOST_EDITS, DRIFT * len(guides.ids))
+            and np.array_equal(self._ids[kept], guides.ids[: len(kept)])
+            and _same_roots(self._roots, kept, guides.roots)
+        )
+        return count if stays else None
+
     def update(self, guides: Guides, children: Children) -> NDArray[np.int32]:
         """Follow planted, deleted and re-rooted guides; the rows of `children` to evaluate again.
 
         New guides stand after the old ones, deleted ones leave the rest in order, as every kernel of the groom does
         it; anything else, or very much at once, binds everything anew. Under a millisecond for one guide.
         """
-        if guides.ids is self._ids and guides.roots is self._roots:
+        if self.serves(guides):
             return np.zeros(0, np.int32)
-        gone = np.flatnonzero(~np.isin(self._ids, guides.ids))
-        kept = np.delete(np.arange(len(self._ids)), gone)
-        new = np.arange(len(kept), len(guides.ids))
-        stays = (
-            len(gone) + len(new) <= MOST_EDITS
-            and len(kept) > 0
-            and self._sites.edits + len(gone) + len(new) <= max(MOST_EDITS, DRIFT * len(guides.ids))
-            and np.array_equal(self._ids[kept], guides.ids[: len(kept)])
-            and _same_roots(self._roots, kept, guides.roots)
-        )
-        if not stays:
+        if self.edits_to(guides) is None:
             self._bind(guides)
-            bound = self.binding()
-            everything = np.arange(len(children), dtype=np.int32)
-            return children.rebind(Rebound(everything, bound.sites, bound.weights))
+            return self.rebind_all(children)
+        gone, _, new = self._difference(guides)
         rows = [np.zeros(0, np.int32)]
         for row in gone[::-1]:
             rebound = self._sites.remove_site(int(row))
@@ -124,6 +135,19 @@ class CoatBinding:
                 rows.append(children.rebind(self._sites.add_site(int(t), b)))
         self._ids, self._roots = guides.ids, guides.roots
         return np.unique(np.concatenate(rows)).astype(np.int32)
+
+    def rebind_all(self, children: Children) -> NDArray[np.int32]:
+        """Give this binding to all `children`; their rows."""
+        bound = self.binding()
+        return children.rebind(Rebound(np.arange(len(children), dtype=np.int32), bound.sites, bound.weights))
+
+    def _difference(
+        self, guides: Guides
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """Rows that are gone, rows that were kept, and rows of `guides` that are new."""
+        gone = np.flatnonzero(~np.isin(self._ids, guides.ids))
+        kept = np.delete(np.arange(len(self._ids)), gone)
+        return gone, kept, np.arange(len(kept), len(guides.ids))
 
 
 def _same_roots(old: Roots, kept: NDArray[np.intp], new: Roots) -> bool:

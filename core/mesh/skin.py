@@ -33,6 +33,13 @@ class Skin(NamedTuple):
     diagonal: float
 
 
+class Posed(NamedTuple):
+    """Where the vertices of a mesh are in one pose: points (V, 3) float32 and smooth unit normals (V, 3) float32."""
+
+    points: np.ndarray
+    normals: np.ndarray
+
+
 def skin_at_rest(mesh: Mesh, evaluator: Evaluator) -> Skin:
     """The skin of the mesh at rest, remembered by the evaluator."""
     return evaluator.get(_rest, mesh)
