@@ -16,6 +16,9 @@ from core.formats.project import read_project, write_project
 from core.formats.recovery import abandoned, recover, recover_newest
 from core.history import DEFAULT_BUDGET, History
 from core.workspace import Workspace
+from tools.hand import Hand
+from tools.registry import Registry
+from tools.tool import Tool
 
 Listener = Callable[[Document, Document], None]
 
@@ -24,8 +27,9 @@ class Session:
     """What a hand, a script and a test drive alike. Used from one thread.
 
     document : the value shown, which during a stroke is a preview.
-    workspace : frame, cameras, panels; replace it freely, undo leaves it alone.
+    workspace : frame, cameras, panels, tool; change it with :meth:`set_workspace`, undo leaves it alone.
     changed : called with the old and the new value after every change of `document`; the one listener there is.
+    tools : the tools there are. hand : makes their strokes.
     """
 
     def __init__(
@@ -39,6 +43,7 @@ class Session:
         history_bytes: int = DEFAULT_BUDGET,
         hashes: ArrayHashes | None = None,
         name: str = "New",
+        tools: Registry | None = None,
     ) -> None:
         self.history: History[Document] = History(document or Document(), name, history_bytes)
         self.workspace = workspace or Workspace()
@@ -49,6 +54,9 @@ class Session:
         self._saved: Document | None = self.history.current
         self._hashes = hashes or ArrayHashes()
         self._journal = journal
+        self.tools = tools if tools is not None else Registry()
+        self.hand = Hand(self)
+        self._tool: tuple[str, Any, Tool[Any]] | None = None
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], journal: Journal | None = None) -> Session:
@@ -104,6 +112,44 @@ class Session:
     def autosave_error(self) -> UserError | None:
         """Why autosaving does not work at present, or None."""
         return None if self._journal is None else self._journal.error
+
+    @property
+    def stroking(self) -> bool:
+        """True while a stroke goes on: a good time to do nothing else."""
+        return self.hand.stroking
+
+    @property
+    def tool(self) -> Tool[Any]:
+        """The active tool with the parameters of the workspace; the first of the shelf when that names none."""
+        name = self.workspace.tool
+        return self.tool_named(name if name in self.tools else next(iter(self.tools)).name)
+
+    def tool_named(self, name: str) -> Tool[Any]:
+        """A tool with the parameters the workspace has for it."""
+        params = self.workspace.params.get(name)
+        if name != self.workspace.tool:
+            return self.tools.make(name, params)
+        if self._tool is None or self._tool[0] != name or self._tool[1] is not params:
+            self._tool = (name, params, self.tools.make(name, params))
+        return self._tool[2]
+
+    def set_workspace(self, **changes: Any) -> None:
+        """Replace fields of the workspace. Another tool, groom or frame gives up the stroke that goes on."""
+        if self.stroking and changes.keys() & {"tool", "groom", "frame", "respect"}:
+            self.hand.cancel()
+        self.workspace = self.workspace.replace(**changes)
+
+    def choose(self, name: str, **params: Any) -> None:
+        """Make a tool the active one, with some of its parameters changed.
+
+        Raises
+        ------
+        UserError
+            There is no such tool, or a parameter is not as it should be.
+        """
+        wanted = {**self.workspace.params.get(name, {}), **params}
+        self.tools.make(name, wanted)
+        self.set_workspace(tool=name, params={**self.workspace.params, name: wanted})
 
     def preview(self, document: Document) -> None:
         """Show a value without a step: what a stroke looks like while it goes on."""
