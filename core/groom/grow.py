@@ -12,24 +12,21 @@ from core.evaluator import Evaluator
 from core.groom.binding import triangle_places
 from core.groom.children import Children, evaluate, update_roots
 from core.groom.coat_values import set_coat
+from core.groom.collision import collision, settle_rows
 from core.groom.dress import Stage, no_stages
 from core.groom.groom import Groom, Map
 from core.groom.maps import density_at
 from core.groom.resample import with_point_count
-from core.groom.settle import inside_segments, settle, settle_exactly
+from core.groom.settle import inside_segments
 from core.mesh.bvh import closest_points
-from core.mesh.distance_field import build_distance_field
 from core.mesh.edges import is_closed
 from core.mesh.intrinsic import Binding, bind
 from core.mesh.mesh import Mesh
 from core.mesh.roots import Roots
 from core.mesh.scatter import Scatter, scatter
-from core.mesh.signed_distance import build_signed_skin
-from core.mesh.skin import Skin, distance_field, signed_skin, skin_at_rest
+from core.mesh.skin import Skin, skin_at_rest
 from core.mesh.surface import root_normals, strands_on_deformed
 from core.record import freeze
-
-INSIDE_TOLERANCE = 1e-5  # of the bounding-box diagonal: what float32 roots may lie under the skin
 
 
 def grow(
@@ -71,16 +68,7 @@ def grow(
         update_roots(children, skin.points, skin.normals)
         evaluate(children, points, normals, workers, shape=children.traits.shape)
     with stage("settle"):
-        field = (
-            build_distance_field(skin.points, skin.triangles.vertices, workers=workers)
-            if posed else distance_field(mesh, evaluator)
-        )
-        settle(children.points, field, workers=workers)
-        if is_closed(mesh):
-            signed = (
-                build_signed_skin(skin.points, skin.triangles.vertices) if posed else signed_skin(mesh, evaluator)
-            )
-            settle_exactly(children.points, field, signed, INSIDE_TOLERANCE * skin.diagonal, workers)
+        settle_rows(children.points, None, collision(mesh, skin.points, evaluator), workers)
     return children
 
 
@@ -120,8 +108,7 @@ def measure(groom: Groom, mesh: Mesh, children: Children, evaluator: Evaluator) 
     error = float(distance.max()) / skin.diagonal if len(roots) else 0.0
     if not is_closed(mesh):
         return Figures(error, None)
-    inside = inside_segments(
-        children.points, distance_field(mesh, evaluator), signed_skin(mesh, evaluator),
-        INSIDE_TOLERANCE * skin.diagonal, evaluator.workers,
-    )
+    hard = collision(mesh, skin.points, evaluator)
+    assert hard.signed is not None  # the skin is closed
+    inside = inside_segments(children.points, hard.field, hard.signed, hard.tolerance, evaluator.workers)
     return Figures(error, int(inside.sum()))
