@@ -24,7 +24,7 @@ def skin_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> Skin
     """The skin of a mesh at a frame; at rest without a frame or without a clip."""
     if frame is None or not moves(item):
         return skin_at_rest(item.mesh, evaluator)
-    points = evaluator.get(_points, item.mesh, item.rig, frame=float(frame), evaluator=evaluator)
+    points = evaluator.get(points_at, item.mesh, item.rig, frame=float(frame), evaluator=evaluator)
     return evaluator.get(_skin, item.mesh, points, evaluator=evaluator)
 
 
@@ -36,7 +36,8 @@ def field_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> Dis
     return evaluator.get(_field, item.mesh, skin.points, evaluator=evaluator)
 
 
-def _points(mesh: Mesh, rig: Rig, frame: float, evaluator: Evaluator) -> NDArray[np.float32]:
+def points_at(mesh: Mesh, rig: Rig, frame: float, evaluator: Evaluator) -> NDArray[np.float32]:
+    """The vertices (V, 3) float32 at a frame, frozen; the very ones at rest where the pose moves nothing."""
     points = posed_points(mesh.points, rig, frame, evaluator.workers.ranges)
     # a pose that moves nothing but by rounding is the rest itself, so that all that is known of it serves
     rounding = 1e-6 * skin_at_rest(mesh, evaluator).diagonal

@@ -94,7 +94,7 @@ class LiveCoat:
         self._frame = frame
         self.trouble: UserError | None = None
         self._behind = False
-        self._posed = self._at_rest if posed is None else posed
+        self._posed = self._at_rest
         self._stand()
         self.follow(groom, frame, posed, rows_shown)
 
@@ -121,7 +121,8 @@ class LiveCoat:
         posed : where the skin is at the frame; at rest when None. Told from the last by the identity of its points.
         rows_shown : only so many of :attr:`order` are evaluated now, the others owed; all of them when None.
         """
-        posed = self._at_rest if posed is None else posed
+        if posed is None or posed.points is self._at_rest.points:
+            posed = self._at_rest
         if posed.points is not self._posed.points:
             self._posed = posed
             self._stand()

@@ -63,3 +63,15 @@ def density_at(
     if item is None:
         return None
     return lambda triangle, weights: np.clip(sample_map(item, mesh, triangles, triangle, weights), 0.0, 1.0)
+
+
+def at_vertices(item: Map, mesh: Mesh) -> NDArray[np.float32]:
+    """A map as one value for each vertex, (V,) float32: its own, or an image read at the UVs of the corners there."""
+    if item.values is not None:
+        return item.values
+    assert item.image is not None  # Map holds exactly one of the two
+    if mesh.uvs is None:
+        raise UserError("an image map needs UVs and this mesh has none; paint per vertex or unwrap the mesh first")
+    count = np.bincount(mesh.corners, minlength=len(mesh.points))
+    total = np.bincount(mesh.corners, sample_image(item.image, mesh.uvs), len(mesh.points))
+    return (total / np.maximum(count, 1)).astype(np.float32)
