@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import Any
 
 import moderngl
@@ -69,9 +69,13 @@ class LightMaps:
         self.sums_target = ctx.framebuffer([self.sums])
 
     def draw(
-        self, scene: Scene, toward: NDArray[np.float64], meshes: Sequence[MeshDrawable], coats: Sequence[CoatDrawable]
-    ) -> dict[str, Any]:
-        """Draw the maps; returns the uniforms of lighting.glsl that describe them."""
+        self, scene: Scene, toward: NDArray[np.float64], meshes: Sequence[MeshDrawable], coats: Sequence[CoatDrawable],
+        shares: Sequence[float] = (),
+    ) -> Generator[None, None, dict[str, Any]]:
+        """Draw the maps in steps; returns the uniforms of lighting.glsl that describe them.
+
+        shares : of each coat, see :meth:`CoatDrawable.draw_opacity`; 1 when not given.
+        """
         ctx = self.ctx
         matrix, size = light_frame(scene, toward)
         # texels are square in metres only when the box is: the mean serves the opacity, which is a ratio of areas
@@ -84,23 +88,33 @@ class LightMaps:
             target.use()
             target.clear(depth=1.0)
             for mesh in meshes:
-                mesh.draw_depth(matrix)
+                if not mesh.surface.ghost:
+                    mesh.draw_depth(matrix)
+        yield
         for coat in coats:
-            coat.draw_depth(matrix)
-        self.sums_target.use()
+            for _ in coat.draw_depth(matrix):
+                yield
+                self.first_target.use()
+                ctx.enable(moderngl.DEPTH_TEST)
         self.sums_target.clear()
-        ctx.disable(moderngl.DEPTH_TEST)
-        ctx.enable(moderngl.BLEND)
-        ctx.blend_func = moderngl.ONE, moderngl.ONE
-        self.first_depth.use(4)
         described: dict[str, Any] = {
             "first_depth": 4, "light_from_world": matrix, "layer_ends": ends, "light_range": float(size[2]),
         }
-        for coat in coats:
-            coat.draw_opacity(texel, described)
-        ctx.disable(moderngl.BLEND)
+        for coat, share in zip(coats, shares or [1.0] * len(coats), strict=True):
+            steps = coat.draw_opacity(texel, described, share)
+            while True:
+                self.sums_target.use()
+                ctx.disable(moderngl.DEPTH_TEST)
+                ctx.enable(moderngl.BLEND)
+                ctx.blend_func = moderngl.ONE, moderngl.ONE
+                self.first_depth.use(4)
+                more = next(steps, self) is None
+                ctx.disable(moderngl.BLEND)
+                if not more:
+                    break
+                yield
         return {
-            **described, "skin_depth": 5, "coat_opacity": 6, "tap_spread": 2.0,
+            **described, "skin_depth": 5, "coat_opacity": 6, "tap_spread": 2.0, "tap_reach": 1,
             "skin_bias": max(0.12 * length, 4.0 * texel),
         }
 

@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Generator, Iterator
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from core.camera import Camera, clip_from_world, pixel_scale, view_from_world
+from core.workspace import ViewOptions
+from viewport.backdrop import Backdrop
 from viewport.drawables.guides import GuideDrawable, GuidePrograms
-from viewport.drawables.mesh import MeshDrawable, MeshPrograms
-from viewport.drawables.strands import ABSORPTION, CoatDrawable, StrandPrograms
+from viewport.drawables.strands import CoatDrawable, StrandPrograms
+from viewport.kept import matched
 from viewport.light_maps import LightMaps
+from viewport.near_side import shown_rows
 from viewport.ribbons import Ribbons, drawn_points, far_to_near
 from viewport.scene import Scene, direction, scene_extent
-from viewport.shaders import program, set_uniforms
+from viewport.solids import PLAIN, Solids
 
 LARGEST_TILE = 4096  # samples on a side
+ROWS_AT_ONCE = 256  # of samples of the meshes, drawn between two steps
 
 Progress = Callable[[float], object]
+
+
+class Prepared(NamedTuple):
+    """A scene whose light, shading and layout on the screen are on the card, ready to be painted."""
+
+    scene: Scene
+    camera: Camera
+    size: tuple[int, int]
+    uniforms: dict[str, Any]
+    options: ViewOptions
 
 
 class Renderer:
@@ -28,116 +42,136 @@ class Renderer:
 
     Buffers are kept as long as the arrays of the scene are the same objects; another array of the same size is
     written into the same buffer. Arrays whose rows were changed in place are named with :meth:`rows_changed`.
+
+    Drawing goes in steps that leave the state of the context as they found it and take a few dozen milliseconds at
+    the most, so that a window can stop between any two of them.
     """
 
     def __init__(self, ctx: moderngl.Context, shadow_side: int = 1024) -> None:
         self.ctx = ctx
-        self.mesh_programs = MeshPrograms(ctx)
+        self.solids = Solids(ctx)
         self.strand_programs = StrandPrograms(ctx)
         self.guide_programs = GuidePrograms(ctx)
         self.ribbons = Ribbons(ctx)
         self.light_maps = LightMaps(ctx, shadow_side)
-        self.resolve = program(ctx, ("fullscreen.vert",), ("resolve.frag",))
-        self.resolve_triangle = ctx.vertex_array(self.resolve, [])
-        self.meshes: list[MeshDrawable] = []
+        self.backdrop = Backdrop(ctx)
         self.coats: list[CoatDrawable] = []
         self.guides: list[GuideDrawable] = []
         self.tile: tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer] | None = None
 
-    def rows_changed(self, points: np.ndarray, start: int, stop: int) -> None:
-        """Upload hairs or guides `start` to before `stop` of an array on the card that was written to in place."""
+    def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
+        """Upload again, before the next picture, these rows of an array of hairs or guides written to in place."""
         for coat in self.coats:
             if coat.coat.points is points:
-                coat.upload_rows(coat.coat, start, stop)
+                coat.textures.mark(rows)
         for guides in self.guides:
             if guides.lines.points is points:
-                guides.upload_rows(guides.lines, start, stop)
+                guides.textures.mark(rows)
 
     def draw(
         self, scene: Scene, camera: Camera, framebuffer: moderngl.Framebuffer, size: tuple[int, int],
-        samples: int = 1, progress: Progress | None = None,
+        samples: int = 1, progress: Progress | None = None, options: ViewOptions = PLAIN,
     ) -> None:
         """Draw into `size` (width, height) pixels from the lower left corner of the framebuffer.
 
         samples : samples on a side of every pixel (2 gives 4 a pixel).
-        progress : called with the done part 0 .. 1 between slices; an exception it raises stops the drawing.
+        progress : called with the done part 0 .. 1 between steps; an exception it raises stops the drawing.
         """
-        told = progress if progress is not None else _nobody
-        self._upload(scene)
-        told(0.05)
-        toward = {name: self._world_direction(scene, camera, name) for name in ("key", "fill", "rim")}
-        lighting = self.light_maps.draw(scene, toward["key"], self.meshes, self.coats)
-        lighting |= _light_uniforms(scene, camera, toward)
-        told(0.2)
+        for part in self.steps(scene, camera, framebuffer, size, samples, options):
+            self.ctx.finish()
+            if progress is not None:
+                progress(part)
+
+    def steps(
+        self, scene: Scene, camera: Camera, framebuffer: moderngl.Framebuffer, size: tuple[int, int],
+        samples: int = 1, options: ViewOptions = PLAIN,
+    ) -> Iterator[float]:
+        """Draw as :meth:`draw` does, a little at every step; the done part 0 .. 1."""
+        prepared = yield from _scaled(self.prepare(scene, camera, size, options), 0.0, 0.4)
+        yield from _scaled(self.paint(prepared, framebuffer, samples), 0.4, 1.0)
+
+    def prepare(
+        self, scene: Scene, camera: Camera, size: tuple[int, int], options: ViewOptions = PLAIN
+    ) -> Generator[float, None, Prepared]:
+        """Upload, draw the light's maps and shade every point, in steps; the done part 0 .. 1."""
+        yield from self._upload(scene)
+        toward = light_directions(scene, camera)
+        maps = self.light_maps.draw(scene, toward["key"], self.solids.meshes, self.coats)
+        lighting = yield from _told(maps, 0.3)
+        uniforms = camera_uniforms(scene, camera, size) | lighting | light_uniforms(scene, toward)
+        for things in (self.coats, self.guides):
+            for thing in things:
+                steps = thing.work_out(uniforms)
+                self._before_shading()
+                for _ in steps:
+                    yield 0.7
+                    self._before_shading()
+        yield 1.0
+        return Prepared(scene, camera, size, uniforms, options)
+
+    def _before_shading(self) -> None:
+        self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self.light_maps.bind()
+
+    def paint(
+        self, prepared: Prepared, framebuffer: moderngl.Framebuffer, samples: int = 1, near_only: bool = False
+    ) -> Iterator[float]:
+        """Draw what was prepared, in steps; the done part 0 .. 1.
+
+        near_only : leave out hairs that stand on the side of the skin that is turned away, and short pieces.
+        """
+        scene, camera, size = prepared.scene, prepared.camera, prepared.size
         view_row = -view_from_world(camera)[2]
-        strands = [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]
         low, high = scene_extent(scene)
         away = 1.0 if camera.orthographic else max(float(view_row @ [*(0.5 * (low + high)), 1.0]), camera.near)
-        scale = pixel_scale(camera, size[1]) * samples / away
-        pieces = [drawn_points(points, scale) for points in strands]
-        orders = [far_to_near(points, view_row, drawn) for points, drawn in zip(strands, pieces, strict=True)]
+        scale = pixel_scale(camera, size[1]) * (0.5 if near_only else samples) / away
+        pieces, orders = [], []
+        for strands in (*scene.coats, *scene.guides):
+            rows = shown_rows(strands, camera, near_only)
+            pieces.append(drawn_points(strands.points, scale))
+            orders.append((yield from _told(far_to_near(strands.points, view_row, pieces[-1], rows), 0.1)))
         tiles = _tiles(size, samples)
         for number, tile in enumerate(tiles):
-            def tile_told(part: float, number: int = number) -> None:
-                told(0.2 + 0.8 * (number + part) / len(tiles))
+            painted = self._paint_tile(prepared, samples, tile, orders, pieces)
+            yield from _scaled(painted, 0.1 + 0.9 * number / len(tiles), 0.1 + 0.9 * (number + 1) / len(tiles))
+            assert self.tile is not None
+            self.backdrop.resolved(self.tile[0], scene, size, samples, tile, framebuffer)
+        yield 1.0
 
-            self._draw_tile(scene, camera, size, samples, tile, lighting, orders, pieces, tile_told)
-            self._resolve_tile(scene, framebuffer, size, samples, tile)
-        told(1.0)
-
-    def _upload(self, scene: Scene) -> None:
+    def _upload(self, scene: Scene) -> Iterator[float]:
         ctx = self.ctx
-        self.meshes = _matched(self.meshes, scene.surfaces, lambda s: MeshDrawable(ctx, self.mesh_programs, s))
-        self.coats = _matched(self.coats, scene.coats, lambda c: CoatDrawable(ctx, self.strand_programs, c))
-        self.guides = _matched(self.guides, scene.guides, lambda g: GuideDrawable(ctx, self.guide_programs, g))
+        self.solids.upload(scene)
+        self.coats = matched(self.coats, scene.coats, lambda c: CoatDrawable(ctx, self.strand_programs, c))
+        self.guides = matched(self.guides, scene.guides, lambda g: GuideDrawable(ctx, self.guide_programs, g))
+        yield 0.02
+        for things in (self.coats, self.guides):
+            for thing in things:
+                for _ in thing.upload():
+                    yield 0.1
 
-    @staticmethod
-    def _world_direction(scene: Scene, camera: Camera, name: str) -> NDArray[np.float64]:
-        vector = direction(getattr(scene.lights, name))
-        return camera.world_from_camera[:3, :3] @ vector if scene.lights.follow_camera else vector
-
-    def _draw_tile(
-        self, scene: Scene, camera: Camera, size: tuple[int, int], samples: int, tile: tuple[int, int, int, int],
-        lighting: dict[str, Any], orders: list[NDArray[np.uint32]], pieces: list[NDArray[np.intp]], told: Progress,
-    ) -> None:
-        _, _, width, height = tile
-        wide, high = width * samples, height * samples
+    def _paint_tile(
+        self, prepared: Prepared, samples: int, tile: tuple[int, int, int, int], orders: list[NDArray[np.uint32]],
+        pieces: list[NDArray[np.intp]],
+    ) -> Iterator[float]:
+        scene, camera, size = prepared.scene, prepared.camera, prepared.size
         matrix = _tile_from_picture(size, tile) @ clip_from_world(camera, *size)
-        uniforms = {
-            **lighting, "clip_from_world": matrix, "picture_size": (float(wide), float(high)),
-            "pixels_at_one": pixel_scale(camera, size[1]) * samples,
-        }
-        ctx = self.ctx
-        ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self.light_maps.bind()
-        for coat in self.coats:
-            coat.work_out(uniforms)
-        for guides in self.guides:
-            guides.work_out(uniforms, samples)
-        target = self._tile_target(wide, high)
+        target = self._tile_target(tile[2] * samples, tile[3] * samples)
         target.use()
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-        ctx.enable(moderngl.DEPTH_TEST)
-        depth = max((coat.look.depth for coat in scene.coats), default=1.0)
-        covered = {"absorption": ABSORPTION * depth, "covered": 1.0 if scene.coats else 0.0}
-        for mesh, surface in zip(self.meshes, scene.surfaces, strict=True):
-            mesh.draw(surface.color, {**uniforms, **covered})
-        ctx.enable(moderngl.BLEND)
-        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        target.depth_mask = False
+        uniforms = {**prepared.uniforms, "clip_from_world": matrix}
+        for bottom in range(0, target.height, ROWS_AT_ONCE):
+            target.scissor = (0, bottom, target.width, ROWS_AT_ONCE)
+            self.light_maps.bind()
+            self.solids.draw(scene, camera, target, uniforms, prepared.options)
+            target.scissor = None
+            yield 0.05 * bottom / target.height
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
-        total, before = sum(len(order) for order in orders), 0
-        try:
-            for textures, order, points in zip(drawn, orders, pieces, strict=True):
-                def slice_told(part: float, before: int = before, count: int = len(order)) -> None:
-                    self.ctx.finish()
-                    told((before + part * count) / total)
-
-                self.ribbons.draw(textures, order, points, matrix, (wide, high), slice_told)
-                before += len(order)
-        finally:
-            target.depth_mask = True
-            ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST)
+        total, before = max(sum(len(order) for order in orders), 1), 0
+        for textures, order, points in zip(drawn, orders, pieces, strict=True):
+            share = 0.95 * len(order) / total
+            for part in self.ribbons.draw(textures, order, points, matrix, target, samples):
+                yield 0.05 + before + part * share
+            before += share
 
     def _tile_target(self, width: int, height: int) -> moderngl.Framebuffer:
         if self.tile is None or self.tile[0].size != (width, height):
@@ -148,21 +182,6 @@ class Renderer:
             self.tile = (color, depth, self.ctx.framebuffer([color], depth))
         return self.tile[2]
 
-    def _resolve_tile(
-        self, scene: Scene, framebuffer: moderngl.Framebuffer, size: tuple[int, int], samples: int,
-        tile: tuple[int, int, int, int],
-    ) -> None:
-        assert self.tile is not None
-        framebuffer.use()
-        framebuffer.viewport = tile
-        self.tile[0].use(0)
-        set_uniforms(self.resolve, {
-            "samples": 0, "samples_per_side": samples, "origin": (float(tile[0]), float(tile[1])),
-            "picture_height": float(size[1]), "top_color": scene.background[0], "bottom_color": scene.background[1],
-            "exposure": scene.exposure,
-        })
-        self.resolve_triangle.render(moderngl.TRIANGLES, vertices=3)
-
     def _release_tile(self) -> None:
         if self.tile is not None:
             for thing in reversed(self.tile):
@@ -172,42 +191,55 @@ class Renderer:
     def release(self) -> None:
         """Give back everything; the context must be current."""
         self._release_tile()
-        things: list[Any] = [*self.meshes, *self.coats, *self.guides, self.resolve_triangle, self.resolve]
-        things += [self.light_maps, self.ribbons, self.mesh_programs, self.strand_programs, self.guide_programs]
+        things: list[Any] = [*self.coats, *self.guides, self.backdrop, self.solids]
+        things += [self.light_maps, self.ribbons, self.strand_programs, self.guide_programs]
         for thing in things:
             thing.release()
-        self.meshes, self.coats, self.guides = [], [], []
+        self.coats, self.guides = [], []
 
 
-def _nobody(_: float) -> None:
-    return None
+def _scaled(steps: Any, low: float, high: float) -> Generator[float, None, Any]:
+    """The same steps, their done part between `low` and `high`; returns what they return."""
+    while True:
+        try:
+            part = next(steps)
+        except StopIteration as end:
+            return end.value
+        yield low + (high - low) * part
 
 
-def _matched(kept: list[Any], wanted: tuple[Any, ...], make: Callable[[Any], Any]) -> list[Any]:
-    """Drawables for the wanted things: one with just these arrays, else one that can take them, else a new one."""
-    spare = list(kept)
-    found: list[Any] = [None] * len(wanted)
-    for turn in ("holds", "update"):
-        for i, thing in enumerate(wanted):
-            if found[i] is not None:
-                continue
-            match = next((d for d in spare if getattr(d, turn)(thing)), None)
-            if match is not None:
-                spare.remove(match)
-                match.update(thing)
-                found[i] = match
-    for drawable in spare:
-        drawable.release()
-    return [make(thing) if drawable is None else drawable for drawable, thing in zip(found, wanted, strict=True)]
+def _told(steps: Any, part: float) -> Generator[float, None, Any]:
+    """The same steps, which do not say how much is done."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+        yield part
 
 
-def _light_uniforms(scene: Scene, camera: Camera, toward: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
+def light_directions(scene: Scene, camera: Camera) -> dict[str, NDArray[np.float64]]:
+    """Unit directions (3,) in world towards the key, fill and rim light."""
+    turned = camera.world_from_camera[:3, :3] if scene.lights.follow_camera else np.eye(3)
+    return {name: turned @ direction(getattr(scene.lights, name)) for name in ("key", "fill", "rim")}
+
+
+def camera_uniforms(scene: Scene, camera: Camera, size: tuple[int, int], to_display: bool = False) -> dict[str, Any]:
+    """Where things lie on the screen, and whether a target holds light or what is shown."""
+    return {
+        "clip_from_world": clip_from_world(camera, *size), "picture_size": (float(size[0]), float(size[1])),
+        "pixels_at_one": pixel_scale(camera, size[1]), "exposure": scene.exposure, "to_display": to_display,
+        "eye_position": camera.position, "eye_backward": -camera.forward, "parallel_view": camera.orthographic,
+    }
+
+
+def light_uniforms(scene: Scene, toward: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
+    """Directions and strengths of the lights."""
     lights = scene.lights
     return {
         "key_direction": toward["key"], "fill_direction": toward["fill"], "rim_direction": toward["rim"],
         "up_direction": (0.0, 1.0, 0.0), "key_color": lights.key_color, "fill_color": lights.fill_color,
         "rim_color": lights.rim_color, "sky_color": lights.sky_color, "ground_color": lights.ground_color,
-        "eye_position": camera.position, "eye_backward": -camera.forward, "parallel_view": camera.orthographic,
     }
 
 

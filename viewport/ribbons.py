@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Generator, Iterator
 
 import moderngl
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from viewport.shaders import program, set_uniforms
 from viewport.strand_textures import StrandTextures, points_by_axis
 
-SEGMENTS_AT_ONCE = 1 << 17  # between two calls of the progress
+SEGMENTS_AT_ONCE = 1 << 14  # blended between two steps
+STRANDS_AT_ONCE = 1 << 14  # whose depths are worked out between two steps
 SHORTEST_PIECE = 3.5  # samples; pieces of hair shorter than that in the middle are joined
 
 
@@ -31,28 +32,44 @@ def drawn_points(points: np.ndarray, samples_per_metre: float) -> NDArray[np.int
 
 
 def far_to_near(
-    points: np.ndarray, view_row: NDArray[np.float64], drawn: NDArray[np.intp] | None = None
-) -> NDArray[np.uint32]:
-    """Order of all pieces by decreasing depth of their middle, (N * (D - 1),) uint32, strand-major numbers.
+    points: np.ndarray, view_row: NDArray[np.float64], drawn: NDArray[np.intp] | None = None,
+    rows: NDArray[np.integer] | None = None,
+) -> Generator[None, None, NDArray[np.uint32]]:
+    """Order of all pieces by decreasing depth of their middle, (M * (D - 1),) uint32, strand-major numbers, in steps.
 
     points : (N, 3, P) or (N, P, 3) float32. view_row : (4,) float64, depth = view_row . (x, y, z, 1).
     drawn : the D points that are drawn (all by default); a piece lies between two of them.
+    rows : the M strands that are drawn (all by default).
 
     Depth is cut into 65,536 steps, so that numpy sorts by radix, in one pass over the data; equal steps keep their
     order, which makes pictures repeat to the bit.
     """
-    x, y, z = (v if drawn is None or len(drawn) == v.shape[1] else v[:, drawn] for v in points_by_axis(points))
-    a, b, c = (np.float32(v) for v in view_row[:3])
-    depth = x * a
-    depth += y * b
-    depth += z * c
-    middle = (depth[:, 1:] + depth[:, :-1]).reshape(-1)
-    if len(middle) == 0:
+    x, y, z = points_by_axis(points)
+    count = x.shape[1] if drawn is None else len(drawn)
+    strands = len(points) if rows is None else len(rows)
+    if strands == 0:
         return np.zeros(0, np.uint32)
-    low, high = float(middle.min()), float(middle.max())
+    a, b, c = (np.float32(v) for v in view_row[:3])
+    middle = np.empty((strands, count - 1), np.float32)
+    for start in range(0, strands, STRANDS_AT_ONCE):
+        which = slice(start, start + STRANDS_AT_ONCE) if rows is None else rows[start : start + STRANDS_AT_ONCE]
+        depth = a * x[which] + b * y[which] + c * z[which]
+        if drawn is not None and count != x.shape[1]:
+            depth = depth[:, drawn]
+        middle[start : start + STRANDS_AT_ONCE] = depth[:, 1:] + depth[:, :-1]
+        yield
+    flat = middle.reshape(-1)
+    low, high = float(flat.min()), float(flat.max())
     scale = np.float32(65535.0 / max(high - low, 1e-30))
-    steps = ((np.float32(high) - middle) * scale).astype(np.uint16)
-    return np.argsort(steps, kind="stable").astype(np.uint32)
+    steps = ((np.float32(high) - flat) * scale).astype(np.uint16)
+    yield
+    order = np.argsort(steps, kind="stable").astype(np.uint32)
+    yield
+    if rows is not None:
+        pieces = np.uint32(count - 1)
+        strand, piece = np.divmod(order, pieces)
+        order = rows.astype(np.uint32)[strand] * pieces + piece
+    return order
 
 
 class Ribbons:
@@ -66,15 +83,12 @@ class Ribbons:
 
     def draw(
         self, strands: StrandTextures, order: NDArray[np.uint32], drawn: NDArray[np.intp],
-        clip_from_world: NDArray[np.float64], size: tuple[int, int], slice_done: Callable[[float], object],
-    ) -> None:
-        """Blend the pieces into the bound framebuffer in the given order, testing depth but not writing it."""
-        strands.bind(self.program)
-        strands.sides.use(1)
-        strands.colors.use(2)
-        set_uniforms(self.program, {
-            "strand_sides": 1, "strand_colors": 2, "clip_from_world": clip_from_world, "picture_size": size,
-        })
+        clip_from_world: NDArray[np.float64], target: moderngl.Framebuffer, samples: int = 1,
+    ) -> Iterator[float]:
+        """Blend the pieces into the target in the given order, testing depth but not writing it; part done, in steps.
+
+        samples : of the target for a pixel, on a side.
+        """
         pieces = np.uint32(len(drawn) - 1)
         start_left, end_left = 2 * drawn[:-1], 2 * drawn[1:]
         corners = np.stack(
@@ -87,8 +101,21 @@ class Ribbons:
             vertices += (strand * np.uint32(2 * strands.per_strand))[:, None]
             self.indices.orphan()
             self.indices.write(vertices.data)
+            target.use()
+            target.depth_mask = False
+            self.ctx.enable(moderngl.BLEND | moderngl.DEPTH_TEST)
+            self.ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+            strands.bind(self.program)
+            strands.sides.use(1)
+            strands.colors.use(2)
+            set_uniforms(self.program, {
+                "strand_sides": 1, "strand_colors": 2, "clip_from_world": clip_from_world,
+                "picture_size": (float(target.width), float(target.height)), "samples_per_pixel": float(samples),
+            })
             self.vertices.render(moderngl.TRIANGLES, vertices=6 * len(segments))
-            slice_done((start + len(segments)) / len(order))
+            target.depth_mask = True
+            self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST)
+            yield (start + len(segments)) / len(order)
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""

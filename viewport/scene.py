@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 Color = tuple[float, float, float]
-MOST_BOUNDING = 50_000  # strands looked at to find how large the scene is
+MOST_BOUNDING = 5_000  # strands looked at to find how large the scene is
 Floats = NDArray[np.float32]
 
 

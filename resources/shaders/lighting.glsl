@@ -9,6 +9,7 @@ uniform vec4 layer_ends;          // those depths, metres
 uniform float light_range;        // metres from depth 0 to depth 1
 uniform float skin_bias;          // metres
 uniform float tap_spread;         // texels
+uniform int tap_reach;            // taps on each side: 1 gives nine, 0 one
 uniform vec3 eye_position;
 uniform vec3 eye_backward;        // towards the viewer
 uniform bool parallel_view;
@@ -27,16 +28,16 @@ float hair_in_front(float behind, vec4 sums)
     return mix(sums.z, sums.w, min((behind - layer_ends.z) / (layer_ends.w - layer_ends.z), 1.0));
 }
 
-// x: part of the key light not blocked by skin; y: optical depth of the hair in the way. Nine taps.
+// x: part of the key light not blocked by skin; y: optical depth of the hair in the way.
 vec2 key_light(vec3 p)
 {
     vec3 q = (light_from_world * vec4(p, 1.0)).xyz * 0.5 + 0.5;
     vec2 texel = tap_spread / vec2(textureSize(first_depth, 0));
-    float open = 0.0, depth = 0.0;
-    for (int j = -1; j <= 1; ++j) {
-        for (int i = -1; i <= 1; ++i) {
+    float open = 0.0, depth = 0.0, total = 4.0 + 12.0 * float(tap_reach);
+    for (int j = -tap_reach; j <= tap_reach; ++j) {
+        for (int i = -tap_reach; i <= tap_reach; ++i) {
             vec2 uv = q.xy + vec2(i, j) * texel;
-            float weight = (i == 0 ? 2.0 : 1.0) * (j == 0 ? 2.0 : 1.0) / 16.0;
+            float weight = (i == 0 ? 2.0 : 1.0) * (j == 0 ? 2.0 : 1.0) / total;
             float behind_skin = (q.z - textureLod(skin_depth, uv, 0.0).r) * light_range;
             open += weight * (1.0 - clamp(behind_skin / skin_bias - 1.0, 0.0, 1.0));
             float behind = (q.z - textureLod(first_depth, uv, 0.0).r) * light_range;

@@ -23,5 +23,5 @@ void main()
     float length2 = dot(line, line);
     vec2 side = length2 > 1e-12 ? vec2(-line.y, line.x) * inversesqrt(length2) : vec2(1.0, 0.0);
     out_side = vec4(side, 0.5 * line_pixels * mix(1.0, 0.6, u), 1.0);
-    out_color = vec4(texelFetch(strand_tints, ivec2(in_row, row), 0).rgb, 1.0);
+    out_color = vec4(shown(texelFetch(strand_tints, ivec2(in_row, row), 0).rgb), 1.0);
 }

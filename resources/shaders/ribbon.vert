@@ -3,7 +3,8 @@
 uniform sampler2D strand_sides;
 uniform sampler2D strand_colors;
 uniform mat4 clip_from_world;
-uniform vec2 picture_size;
+uniform vec2 picture_size;   // samples
+uniform float samples_per_pixel;   // on a side
 out float from_middle;
 out float half_width;
 out vec2 boxes;
@@ -18,7 +19,7 @@ void main()
     ivec2 at = ivec2((strand - row * strands_per_row) * points_per_strand + point, row);
     vec4 side = texelFetch(strand_sides, at, 0);
     color = texelFetch(strand_colors, at, 0);
-    half_width = side.z;
+    half_width = side.z * samples_per_pixel;
     vec2 extent = abs(side.xy);
     boxes = vec2(max(extent.x, extent.y), max(min(extent.x, extent.y), 0.02));
     from_middle = (float(gl_VertexID & 1) * 2.0 - 1.0) * (half_width + 0.5 * (boxes.x + boxes.y));

@@ -87,5 +87,5 @@ void main()
     float edge = 1.0 - clamp(dot(n, v), 0.0, 1.0);
     float rim_gate = clamp(dot(n, rim_direction) * 1.6 + 0.15, 0.0, 1.0) * edge * edge * openness;
     color += rim_color * rim_gate * (highlights(t, rim_direction, v, body, 1.0) * gloss + 0.18 * body);
-    out_color = vec4(color, 1.0);
+    out_color = vec4(shown(color), 1.0);
 }

@@ -25,6 +25,8 @@ def grid(count: int) -> Coat:
 def test_points_come_back_from_the_card(ctx, count):
     for points in (grid(count).points, np.ascontiguousarray(grid(count).points.transpose(0, 2, 1))):
         textures = StrandTextures(ctx, points)
+        for _ in textures.upload(points):
+            pass
         raw = np.frombuffer(textures.points.read(), np.float32).reshape(-1, 3 * textures.per_strand)
         assert np.array_equal(raw[:count], points.reshape(count, -1))
         textures.release()
@@ -59,7 +61,7 @@ def test_known_arrays_are_not_uploaded_again_and_named_rows_are(ctx):
     first = renderer.coats[0]
     coat.points[300:302] += 0.25  # as an evaluator does, in place
     assert picture() == before
-    renderer.rows_changed(coat.points, 300, 302)
+    renderer.rows_changed(coat.points, np.arange(300, 302))
     after = np.frombuffer(picture(), np.float32).reshape(-1, 48)[:1000]
     assert np.array_equal(after, coat.points.reshape(1000, -1))
     scene = Scene(coats=(coat._replace(points=coat.points + np.float32(0.1)),))

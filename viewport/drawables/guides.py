@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import moderngl
@@ -17,7 +18,7 @@ class GuidePrograms:
     """The program all guides are drawn with."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
-        self.shade = program(ctx, ("fullscreen.vert",), ("strand_points.glsl", "line_shade.frag"))
+        self.shade = program(ctx, ("fullscreen.vert",), ("strand_points.glsl", "display.glsl", "line_shade.frag"))
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
@@ -35,11 +36,12 @@ def guide_colors(lines: GuideLines) -> NDArray[np.float32]:
 class GuideDrawable:
     """Textures of one set of guides, kept as long as its arrays are the same ones."""
 
-    def __init__(self, ctx: moderngl.Context, programs: GuidePrograms, lines: GuideLines) -> None:
+    def __init__(self, ctx: moderngl.Context, programs: GuidePrograms, lines: GuideLines, room: int = 0) -> None:
         self.lines = lines
         self.programs = programs
-        self.textures = StrandTextures(ctx, lines.points)
-        self.tints = self.textures.per_strand_texture(guide_colors(lines))
+        self.textures = StrandTextures(ctx, lines.points, room)
+        self.tints = self.textures.per_strand_texture()
+        self.tints_stale = True
         self.shade = ctx.vertex_array(programs.shade, [])
 
     def holds(self, lines: GuideLines) -> bool:
@@ -48,30 +50,29 @@ class GuideDrawable:
         return mine.points is lines.points and mine.states is lines.states and mine.colors == lines.colors
 
     def update(self, lines: GuideLines) -> bool:
-        """Upload what differs into the same textures; False when the size is another."""
-        if lines.points.shape != self.lines.points.shape:
+        """Take over other guides, whose arrays that differ are uploaded next; False when the size is another."""
+        if lines.points is not self.lines.points and not self.textures.resize(lines.points):
             return False
-        if lines.points is not self.lines.points:
-            self.upload_rows(lines, 0, len(lines.points))
-        self.textures.write(self.tints, guide_colors(lines))
+        self.tints_stale |= lines.states is not self.lines.states or lines.colors != self.lines.colors
         self.lines = lines
         return True
 
-    def upload_rows(self, lines: GuideLines, start: int, stop: int) -> None:
-        """Upload the points of the guides from `start` to before `stop` again."""
-        self.textures.write(self.textures.points, lines.points.reshape(-1, 3 * self.textures.per_strand), start, stop)
+    def upload(self) -> Iterator[None]:
+        """Upload what is not yet on the card, in steps."""
+        if self.tints_stale:
+            self.textures.write(self.tints, guide_colors(self.lines))
+            self.tints_stale = False
+        yield from self.textures.upload(self.lines.points)
 
-    def work_out(self, uniforms: dict[str, Any], samples: int) -> None:
-        """Colour every point and lay its line out on the screen."""
-        if self.textures.count == 0:
-            return
-        self.textures.target.use()
+    def work_out(self, uniforms: dict[str, Any]) -> Iterator[None]:
+        """Colour every point and lay its line out on the screen, in steps."""
         self.textures.bind(self.programs.shade)
-        self.tints.use(1)
-        set_uniforms(self.programs.shade, {
-            **uniforms, "strand_tints": 1, "line_pixels": self.lines.pixels * samples,
-        })
-        self.shade.render(moderngl.TRIANGLES, vertices=3)
+        set_uniforms(self.programs.shade, {**uniforms, "strand_tints": 1, "line_pixels": self.lines.pixels})
+        for _ in self.textures.shading():
+            self.textures.points.use(0)
+            self.tints.use(1)
+            self.shade.render(moderngl.TRIANGLES, vertices=3)
+            yield
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""

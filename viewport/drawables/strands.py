@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import moderngl
@@ -15,6 +16,8 @@ from viewport.strand_textures import StrandTextures
 
 SHADOW_HAIRS = 150_000  # more than these are drawn into the light's maps as every second, third ... one, each heavier
 SHADOW_PIECES = 6  # a hair casts its shadow as this many straight pieces at least
+STRANDS_AT_ONCE = 1 << 14  # uploaded between two steps
+LINE_PIECES_AT_ONCE = 1 << 16  # drawn from the light between two steps
 ABSORPTION = 0.4  # per width of hair over width of texel; below 1 as hair scatters light onwards
 
 
@@ -23,7 +26,7 @@ class StrandPrograms:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         points = "strand_points.glsl"
-        self.shade = program(ctx, ("fullscreen.vert",), (points, "lighting.glsl", "strand_shade.frag"))
+        self.shade = program(ctx, ("fullscreen.vert",), (points, "display.glsl", "lighting.glsl", "strand_shade.frag"))
         self.depth = program(ctx, (points, "strand_light.vert"), ("depth_only.frag",))
         self.opacity = program(ctx, (points, "strand_light.vert"), ("strand_opacity.frag",))
 
@@ -54,12 +57,13 @@ def strand_tints(coat: Coat) -> NDArray[np.float32]:
 class CoatDrawable:
     """Textures of one coat, kept as long as its arrays are the same ones."""
 
-    def __init__(self, ctx: moderngl.Context, programs: StrandPrograms, coat: Coat) -> None:
+    def __init__(self, ctx: moderngl.Context, programs: StrandPrograms, coat: Coat, room: int = 0) -> None:
         self.coat = coat
         self.programs = programs
-        self.textures = StrandTextures(ctx, coat.points)
-        self.tints = self.textures.per_strand_texture(strand_tints(coat))
-        self.normals = self.textures.per_strand_texture(_four(coat.normals))
+        self.textures = StrandTextures(ctx, coat.points, room)
+        self.tints = self.textures.per_strand_texture()
+        self.normals = self.textures.per_strand_texture()
+        self.tints_stale = self.normals_stale = True
         self.shade = ctx.vertex_array(programs.shade, [])
         self.depth = ctx.vertex_array(programs.depth, [])
         self.opacity = ctx.vertex_array(programs.opacity, [])
@@ -78,52 +82,66 @@ class CoatDrawable:
         )
 
     def update(self, coat: Coat) -> bool:
-        """Upload what differs into the same textures; False when the size is another."""
+        """Take over another coat, whose arrays that differ are uploaded next; False when the size is another."""
         mine = self.coat
-        if coat.points.shape != mine.points.shape:
+        if coat.points is not mine.points and not self.textures.resize(coat.points):
             return False
-        if coat.points is not mine.points:
-            self.upload_rows(coat, 0, len(coat.points))
-        if coat.normals is not mine.normals:
-            self.textures.write(self.normals, _four(coat.normals))
-        if self._tints_differ(coat):
-            self.textures.write(self.tints, strand_tints(coat))
+        self.normals_stale |= coat.normals is not mine.normals
+        self.tints_stale |= self._tints_differ(coat)
         self.coat = coat
         return True
 
-    def upload_rows(self, coat: Coat, start: int, stop: int) -> None:
-        """Upload the points of the hairs from `start` to before `stop` again."""
-        self.textures.write(self.textures.points, coat.points.reshape(-1, 3 * self.textures.per_strand), start, stop)
+    def upload(self) -> Iterator[None]:
+        """Upload what is not yet on the card, in steps."""
+        coat, at_once = self.coat, self.textures.per_row * max(1, STRANDS_AT_ONCE // self.textures.per_row)
+        for start in range(0, len(coat.points), at_once):
+            part = slice(start, start + at_once)
+            if self.normals_stale:
+                self.textures.write(self.normals, _four(coat.normals[part]), start)
+            if self.tints_stale:
+                self.textures.write(self.tints, strand_tints(_part(coat, part)), start)
+            if self.normals_stale or self.tints_stale:
+                yield
+        self.normals_stale = self.tints_stale = False
+        yield from self.textures.upload(coat.points)
 
-    def draw_depth(self, light_from_world: NDArray[np.float64]) -> None:
-        """Draw the hairs as lines, depth alone, seen from the light."""
-        self._draw_lines(self.programs.depth, self.depth, {"light_from_world": light_from_world})
+    def draw_depth(self, light_from_world: NDArray[np.float64]) -> Iterator[None]:
+        """Draw the hairs as lines, depth alone, seen from the light, in steps."""
+        yield from self._draw_lines(self.programs.depth, self.depth, {"light_from_world": light_from_world})
 
-    def draw_opacity(self, texel: float, uniforms: dict[str, Any]) -> None:
-        """Add the hairs to the layers of the light's opacity map; `texel` is the width of one of its texels, metres."""
-        step = self._shadow_step()
-        opacity = mean_width(self.coat.look) / texel * step
-        self._draw_lines(self.programs.opacity, self.opacity, {**uniforms, "opacity": opacity})
+    def draw_opacity(self, texel: float, uniforms: dict[str, Any], share: float = 1.0) -> Iterator[None]:
+        """Add the hairs to the layers of the light's opacity map, in steps.
+
+        texel : width of one of its texels, metres. share : the part of the coat's cover that these hairs stand for
+        more than once: 1 for all hairs at their true widths.
+        """
+        opacity = mean_width(self.coat.look) / texel * self._shadow_step() * share
+        yield from self._draw_lines(self.programs.opacity, self.opacity, {**uniforms, "opacity": opacity})
 
     def _shadow_step(self) -> int:
         return -(-self.textures.count // SHADOW_HAIRS) or 1
 
-    def _draw_lines(self, prog: moderngl.Program, vertices: moderngl.VertexArray, uniforms: dict[str, Any]) -> None:
-        if self.textures.count == 0:
-            return
+    def _draw_lines(
+        self, prog: moderngl.Program, vertices: moderngl.VertexArray, uniforms: dict[str, Any]
+    ) -> Iterator[None]:
         step = self._shadow_step()
         pieces = self.textures.per_strand - 1
         skip = max(1, pieces // SHADOW_PIECES)
-        self.textures.bind(prog)
-        set_uniforms(prog, {**uniforms, "strand_step": step, "point_step": skip})
-        vertices.render(moderngl.LINE_STRIP, vertices=-(-pieces // skip) + 1, instances=-(-self.textures.count // step))
+        drawn, at_once = -(-self.textures.count // step), max(1, LINE_PIECES_AT_ONCE * skip // pieces)
+        for first in range(0, drawn, at_once):
+            self.textures.bind(prog)
+            set_uniforms(prog, {**uniforms, "strand_step": step, "point_step": skip, "first_strand": first})
+            vertices.render(
+                moderngl.LINE_STRIP, vertices=-(-pieces // skip) + 1, instances=min(at_once, drawn - first)
+            )
+            yield
 
-    def work_out(self, uniforms: dict[str, Any]) -> None:
-        """Shade every point and lay its ribbon out on the screen (into the textures that the ribbons read)."""
-        if self.textures.count == 0:
-            return
+    def work_out(self, uniforms: dict[str, Any]) -> Iterator[None]:
+        """Shade every point and lay its ribbon out on the screen (into the textures that the ribbons read), in steps.
+
+        Other things may be drawn between the steps, as long as they leave units 4, 5 and 6 alone.
+        """
         prog, look = self.programs.shade, self.coat.look
-        self.textures.target.use()
         self.textures.bind(prog)
         self.tints.use(1)
         self.normals.use(2)
@@ -132,12 +150,25 @@ class CoatDrawable:
             "root_color": look.root, "tip_color": look.tip, "blend": look.blend, "gloss": look.gloss,
             "roughness": look.roughness, "absorption": ABSORPTION * look.depth,
         })
-        self.shade.render(moderngl.TRIANGLES, vertices=3)
+        for _ in self.textures.shading():
+            self.textures.points.use(0)
+            self.tints.use(1)
+            self.normals.use(2)
+            self.shade.render(moderngl.TRIANGLES, vertices=3)
+            yield
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
         for thing in (self.shade, self.depth, self.opacity, self.tints, self.normals, self.textures):
             thing.release()
+
+
+def _part(coat: Coat, part: slice) -> Coat:
+    return coat._replace(
+        points=coat.points[part], ids=np.asarray(coat.ids)[part], normals=coat.normals[part],
+        tints=None if coat.tints is None else coat.tints[part],
+        widths=None if coat.widths is None else coat.widths[part], order=None,
+    )
 
 
 def _four(vectors: np.ndarray) -> NDArray[np.float32]:

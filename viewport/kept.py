@@ -1,0 +1,27 @@
+"""Which of the things on the graphics card serve the next picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+
+def matched(kept: Sequence[Any], wanted: Sequence[Any], make: Callable[[Any], Any]) -> list[Any]:
+    """Drawables for the wanted things: one with just these arrays, else one that can take them, else a new one.
+
+    Those left over are released.
+    """
+    spare = list(kept)
+    found: list[Any] = [None] * len(wanted)
+    for turn in ("holds", "update"):
+        for i, thing in enumerate(wanted):
+            if found[i] is not None:
+                continue
+            match = next((d for d in spare if getattr(d, turn)(thing)), None)
+            if match is not None:
+                spare.remove(match)
+                match.update(thing)
+                found[i] = match
+    for drawable in spare:
+        drawable.release()
+    return [make(thing) if drawable is None else drawable for drawable, thing in zip(found, wanted, strict=True)]

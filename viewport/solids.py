@@ -1,0 +1,86 @@
+"""Everything that is not hair: meshes in the manner wanted, their edges, ghosts, and the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import moderngl
+
+from core.camera import Camera
+from core.workspace import ViewOptions
+from viewport.drawables.grid import GridDrawable
+from viewport.drawables.mesh import GHOST_OPACITY, MeshDrawable, MeshPrograms
+from viewport.drawables.strands import ABSORPTION
+from viewport.kept import matched
+from viewport.scene import Scene, scene_extent
+
+WIRE = (0.34, 0.36, 0.40, 1.0)  # linear RGB and opacity of edges alone
+WIRE_OVER = (0.010, 0.011, 0.013, 0.55)  # over shaded triangles
+WIRE_GHOST = (0.20, 0.22, 0.26, 0.25)
+FLAT = (0.060, 0.062, 0.068)  # of triangles that only hide the lines behind them
+CLAY = (0.33, 0.27, 0.235)
+PLAIN = ViewOptions(grid=False, axes=False)
+
+
+class Solids:
+    """Buffers and programs of all surfaces of a scene and of the ground."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self.ctx = ctx
+        self.programs = MeshPrograms(ctx)
+        self.grid = GridDrawable(ctx)
+        self.meshes: list[MeshDrawable] = []
+
+    def upload(self, scene: Scene) -> None:
+        """Bring the surfaces onto the card."""
+        self.meshes = matched(self.meshes, scene.surfaces, lambda s: MeshDrawable(self.ctx, self.programs, s))
+
+    def draw(
+        self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, uniforms: dict[str, Any],
+        options: ViewOptions = PLAIN,
+    ) -> None:
+        """Draw into color and depth of the target, which were cleared."""
+        ctx = self.ctx
+        target.use()
+        depth = max((coat.look.depth for coat in scene.coats), default=1.0)
+        right, up = camera.world_from_camera[:3, 0], camera.world_from_camera[:3, 1]
+        uniforms = {**uniforms, "absorption": ABSORPTION * depth, "view_right": right, "view_up": up}
+        ctx.enable(moderngl.DEPTH_TEST)
+        ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
+        solid = [mesh for mesh in self.meshes if not mesh.surface.ghost]
+        if options.shading != "wire":
+            self._fill(solid, scene, uniforms, options.shading)
+        ctx.enable(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        if options.wire or options.shading in ("wire", "lines"):
+            color = WIRE if options.shading in ("wire", "lines") else WIRE_OVER
+            for mesh in solid:
+                mesh.draw_edges(color, uniforms)
+        target.depth_mask = False
+        if options.grid:
+            low, high = scene_extent(scene)
+            self.grid.draw(camera, 0.5 * (low + high), uniforms)
+        ctx.enable(moderngl.CULL_FACE)
+        for mesh in self.meshes:
+            if mesh.surface.ghost:
+                mesh.draw({**uniforms, "opacity": GHOST_OPACITY, "manner": 1})
+                if options.wire or options.shading in ("wire", "lines"):
+                    mesh.draw_edges(WIRE_GHOST, uniforms)
+        target.depth_mask = True
+        ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+
+    @staticmethod
+    def _fill(meshes: Sequence[MeshDrawable], scene: Scene, uniforms: dict[str, Any], shading: str) -> None:
+        for mesh in meshes:
+            covered = mesh.surface.covered
+            under = bool(scene.coats) if covered is None else covered
+            manner = {"matcap": 1, "lines": 2}.get(shading, 0)
+            color = {"lines": FLAT, "matcap": mesh.surface.color if under else CLAY}.get(shading, mesh.surface.color)
+            mesh.draw({**uniforms, "covered": 1.0 if under else 0.0, "manner": manner}, color)
+
+    def release(self) -> None:
+        """Give back the memory; the context must be current."""
+        for thing in (*self.meshes, self.grid, self.programs):
+            thing.release()
+        self.meshes = []
