@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QObject, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QIcon, QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractSpinBox,
@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.window.commands import Command, Commands, Scope
+from app.window.icons import icon, icon_names
 from app.window.keymap import HELD, Keymap
 
 # widgets that read keys themselves: while one has the focus, only keys that work everywhere do
@@ -79,13 +80,17 @@ class Hotkeys(QObject):
             action.setStatusTip(command.tooltip)
             action.setCheckable(command.checked is not None)
             action.setMenuRole(QAction.MenuRole.NoRole)
+            if command.icon in icon_names():
+                action.setIcon(icon(command.icon))
             action.triggered.connect(partial(self._trigger, name))
             self._actions[name] = action
         return self._actions[name]
 
-    def set_icon(self, name: str, icon: QIcon) -> None:
-        """Give a command's action its icon, in the colours of the theme."""
-        self.action(name).setIcon(icon)
+    def take_look(self) -> None:
+        """Draw the icons in the colours of the theme, which may have changed."""
+        for name, action in self._actions.items():
+            if self._commands[name].icon in icon_names():
+                action.setIcon(icon(self._commands[name].icon or ""))
 
     def refresh(self) -> None:
         """Bring what the actions show in step with the document: what can run, what is on. Called before a menu."""

@@ -36,7 +36,7 @@ class Settings(Record):
         "Theme", "Colours of the window: dark and neutral for judging pictures, or light.",
         choices=("dark", "light"))] = "dark"
     text_size: Annotated[int, field(
-        "Text size", "Height of the window's text in pixels; icons and rows grow with it.", "px", (10, 20), (9, 32), 1)
+        "Text size", "Height of the window's text in pixels; icons and rows grow with it.", "px", (10, 20), (10, 20), 1)
     ] = 12
     keymap: Annotated[Literal["blender", "maya", "houdini"], field(
         "Keymap", "Hotkeys and camera gestures like those of the program you know best.",
@@ -57,7 +57,7 @@ class Settings(Record):
     panels: str = ""
 
     def __post_init__(self) -> None:
-        number(self, "text_size", least=9, most=32)
+        number(self, "text_size", least=10, most=20)
         number(self, "history_mb", least=16, most=65536)
         number(self, "density_ms", least=5.0, most=500.0)
 

@@ -1,0 +1,15 @@
+"""The whole table of commands, from the modules that own them."""
+
+from __future__ import annotations
+
+from app.window.commands import Command
+from app.window.file_commands import EDIT, FILE
+from app.window.tool_commands import HAND, tool_commands
+from app.window.view_commands import FRAME, VIEW
+from app.window.window_commands import WINDOW
+from tools.registry import Registry
+
+
+def all_commands(registry: Registry) -> tuple[Command, ...]:
+    """Every command there is, in the order of the menus; those of the tools come from `registry`."""
+    return (*FILE, *EDIT, *VIEW, *FRAME, *tool_commands(registry), *HAND, *WINDOW)
