@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from core.errors import UserError
+from core.field import field
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
 from core.pose.skeleton import Rig
 from core.record import Record, number, text
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+RATES = (0.001, 100_000.0)  # frames per second
+FRAMES = (-(2**31), 2**31 - 1)
 
 
 class MeshObject(Record):
@@ -20,15 +23,18 @@ class MeshObject(Record):
 
     id : stable, unique in the document.
     rig : what moves it, or None for a mesh at rest.
-    hidden, locked : as the artist set them; a locked mesh is not edited.
     """
 
     id: int
     name: str
     mesh: Mesh
     rig: Rig | None = None
-    hidden: bool = False
-    locked: bool = False
+    hidden: Annotated[bool, field(
+        "Hidden", "Leaves the mesh and its hair out of the view; they stay in the document and its files.",
+    )] = False
+    locked: Annotated[bool, field(
+        "Locked", "Keeps every tool off the mesh and its grooms until it is unlocked again.",
+    )] = False
 
     def __post_init__(self) -> None:
         text(self, "name")
@@ -40,24 +46,33 @@ class MeshObject(Record):
 class Document(Record):
     """Everything undo brings back.
 
-    unit : the length unit of the panels (lengths inside are metres).
-    fps : frames per second.
-    first_frame, last_frame : the range of the timeline; frames may start anywhere.
     meshes, grooms : each with ids unique among their kind.
     """
 
-    unit: str = "m"
-    fps: float = 24.0
-    first_frame: int = 1001
-    last_frame: int = 1100
+    unit: Annotated[str, field(
+        "Unit", "The unit panels show and read lengths in; the document itself keeps metres.",
+        choices=tuple(METRES_PER_UNIT),
+    )] = "m"
+    fps: Annotated[float, field(
+        "Frames per second", "How many frames play in one second; set it to that of the plate or the shot.",
+        soft=(12.0, 60.0), hard=RATES, step=1.0,
+    )] = 24.0
+    first_frame: Annotated[int, field(
+        "First frame", "Where the timeline begins; shots may start at any frame, often at 1001.",
+        "frames", soft=(0, 2000), hard=FRAMES, step=1,
+    )] = 1001
+    last_frame: Annotated[int, field(
+        "Last frame", "Where the timeline ends, this frame included; never before the first frame.",
+        "frames", soft=(0, 2000), hard=FRAMES, step=1,
+    )] = 1100
     meshes: tuple[MeshObject, ...] = ()
     grooms: tuple[Groom, ...] = ()
 
     def __post_init__(self) -> None:
         if self.unit not in METRES_PER_UNIT:
             raise ValueError(f"Document.unit must be one of {', '.join(METRES_PER_UNIT)}, not {self.unit!r}")
-        number(self, "fps", least=0.001, most=100_000.0)
-        number(self, "first_frame", "last_frame", least=-(2**31), most=2**31 - 1)
+        number(self, "fps", least=RATES[0], most=RATES[1])
+        number(self, "first_frame", "last_frame", least=FRAMES[0], most=FRAMES[1])
         if self.first_frame > self.last_frame:
             raise ValueError("Document.first_frame comes after last_frame")
         mesh_ids = {m.id for m in self.meshes}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from core.document import (
+    METRES_PER_UNIT,
     Document,
     MeshObject,
     find_groom,
@@ -16,6 +17,7 @@ from core.document import (
     without_mesh,
 )
 from core.errors import UserError
+from core.field import fields_of
 from core.pose.skeleton import Rig, Skeleton, SkinWeights
 from core.workspace import Workspace
 from tests.documents import grid_mesh, small_document
@@ -109,3 +111,11 @@ def test_records_do_not_change():
     points = small_document().grooms[0].guides.points
     with pytest.raises(ValueError, match="read-only"):
         points[0] = 1
+
+
+def test_fields_an_artist_edits_are_described():
+    assert list(fields_of(Document)) == ["unit", "fps", "first_frame", "last_frame"]
+    assert list(fields_of(MeshObject)) == ["hidden", "locked"]
+    for known in [*fields_of(Document).values(), *fields_of(MeshObject).values()]:
+        assert len(known.tooltip.split()) >= 8, known.label
+    assert fields_of(Document)["unit"].choices == tuple(METRES_PER_UNIT)
