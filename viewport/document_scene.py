@@ -46,11 +46,7 @@ def coat_of(coat: CoatRecord, children: Children) -> Coat:
     """The hairs shown at the density they were grown at; the very arrays of `children` when that is all of them."""
     traits = children.traits
     look = look_of(coat, traits)
-    widths = None
-    if isinstance(traits.width_root, np.ndarray) or isinstance(traits.width_tip, np.ndarray):
-        mean = mean_width(look)
-        each = traits.width_root + (np.asarray(traits.width_tip) - traits.width_root) / 3.0
-        widths = (each / mean if mean > 0.0 else np.zeros_like(each)).astype(np.float32)
+    widths = widths_of(look, traits)
     whole = Coat(children.points, children.ids, children.roots()[1], look, widths=widths)
     rows = children.shown(traits.density)
     if len(rows) == len(children):
@@ -66,6 +62,15 @@ def look_of(coat: CoatRecord, traits: Traits) -> Look:
     """How the hairs of a coat look; widths that differ are here the average of them all."""
     root, tip = (float(np.mean(width)) if np.size(width) else 0.0 for width in (traits.width_root, traits.width_tip))
     return Look(root=coat.color_root, tip=coat.color_tip, root_width=root, tip_width=tip)
+
+
+def widths_of(look: Look, traits: Traits) -> np.ndarray | None:
+    """Factors (N,) float32 on the widths of the look where those of the hairs differ; None where they do not."""
+    if not isinstance(traits.width_root, np.ndarray) and not isinstance(traits.width_tip, np.ndarray):
+        return None
+    mean = mean_width(look)
+    each = traits.width_root + (np.asarray(traits.width_tip) - traits.width_root) / 3.0
+    return np.asarray(each / mean if mean > 0.0 else np.zeros_like(each), np.float32)
 
 
 def scene_of_strands(groom: GroomStrands) -> Scene:

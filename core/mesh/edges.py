@@ -67,3 +67,12 @@ def is_closed(surface: Mesh | Triangles) -> bool:
     else:
         counts, corners = surface.counts, surface.corners
     return Edges.of(counts, corners, int(corners.max(initial=-1)) + 1).closed
+
+
+def edge_vertices(mesh: Mesh) -> NDArray[np.int32]:
+    """The edges of the polygons as pairs of vertices (E, 2) int32, the lower first, each edge once."""
+    following = mesh.corners[next_corner(mesh.counts)]
+    low, high = np.minimum(mesh.corners, following), np.maximum(mesh.corners, following)
+    wide = np.int64(len(mesh.points))
+    keys = np.unique(low * wide + high)
+    return np.stack([keys // wide, keys % wide], axis=1).astype(np.int32)
