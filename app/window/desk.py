@@ -21,7 +21,7 @@ class Desk(QObject):
     workspace_changed : frame, camera, tool, panels ... (old, new).
     stroke_ended : after the release or the end of a stroke; panels that were silent during it look again.
     session_replaced : another document was opened; everything is to be read anew.
-    said : a sentence for the status line. failed : an error in words, with a longer text to copy ("" when there is none).
+    said : a sentence for the status line. failed : an error in words, with a longer text to copy (or "").
     """
 
     changed = Signal(object, object)
@@ -86,12 +86,12 @@ class Desk(QObject):
         try:
             return function(*args, **parameters)
         except UserError as error:
-            self.say_failed(str(error))
+            self.error(error)
             return FAILED
 
-    def say_failed(self, sentence: str, details: str = "") -> None:
+    def error(self, error: Exception, details: str = "") -> None:
         """Say what went wrong; the details can be copied."""
-        self.failed.emit(sentence, details)
+        self.failed.emit(str(error), details)
 
     def end_stroke(self, cancel: bool = False) -> None:
         """Release (or give up) the stroke that goes on, and let panels look again."""
