@@ -25,3 +25,13 @@ def matched(kept: Sequence[Any], wanted: Sequence[Any], make: Callable[[Any], An
     for drawable in spare:
         drawable.release()
     return [make(thing) if drawable is None else drawable for drawable, thing in zip(found, wanted, strict=True)]
+
+
+def same(a: Any, b: Any) -> bool:
+    """True when two values hold the very same arrays and equal numbers; tuples are looked into."""
+    if a is b:
+        return True
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
+    plain = (bool, int, float, str, type(None))
+    return isinstance(a, plain) and isinstance(b, plain) and a == b

@@ -52,6 +52,11 @@ def usual_length(scene: Scene) -> float:
 class LightMaps:
     """Textures drawn from the key light and the uniforms that let lighting.glsl read them (units 4, 5, 6)."""
 
+    UNIFORMS = (
+        "first_depth", "skin_depth", "coat_opacity", "light_from_world", "layer_ends", "light_range", "tap_spread",
+        "tap_reach", "skin_bias",
+    )  # fmt: skip
+
     def __init__(self, ctx: moderngl.Context, side: int = 1024) -> None:
         self.ctx = ctx
         self.side = side

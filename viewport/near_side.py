@@ -9,7 +9,8 @@ from core.camera import Camera
 from viewport.scene import Coat, GuideLines
 
 AWAY = -0.35  # cosine between skin and the way to the eye below which hair is hidden by what it grows on
-FEWEST_POINTS, MOST_POINTS = 5, 8  # of a hair while the hand moves
+FEWEST_POINTS, MOST_POINTS = 4, 8  # of a hair while the hand moves
+PIXELS_A_PIECE = 7.0  # of a hair of usual length
 WIDER = 0.75  # exponent: fewer hairs are wider, between what keeps one hair's look and what keeps all of the cover
 
 
@@ -44,29 +45,45 @@ def prefix_rows(coat: Coat, hairs: int) -> NDArray[np.integer]:
     return np.arange(0, len(coat.points), -(-len(coat.points) // max(hairs, 1)) or 1, dtype=np.int32)
 
 
-def sparse_coat(coat: Coat, camera: Camera, hairs: int, points: int | None = None) -> Coat:
+def sparse_coat(coat: Coat, camera: Camera, hairs: int, scale: float) -> Coat:
     """The near side of an even part of a coat, gathered, with fewer points and wider hairs.
 
     hairs : how many of the coat are taken before those on the far side are left out.
-    points : of each hair, all by default.
+    scale : pixels as :func:`core.camera.pixel_scale` gives them; long hairs get more points.
+    `order` of the result holds the rows of the coat that were taken.
     """
     rows = prefix_rows(coat, hairs)
     shown = len(coat.points) if coat.order is None else len(coat.order)
     wider = (shown / max(len(rows), 1)) ** WIDER
-    rows = rows[turned_to(camera, roots_of(coat.points)[rows], coat.normals[rows])]
+    roots = roots_of(coat.points)[rows]
+    near = turned_to(camera, roots, coat.normals[rows])
+    rows, roots = rows[near], roots[near]
     look = coat.look._replace(root_width=coat.look.root_width * wider, tip_width=coat.look.tip_width * wider)
+    count = MOST_POINTS
+    if len(rows):
+        last = coat.points[rows, :, -1] if coat.points.shape[1] == 3 else coat.points[rows, -1]
+        away = 1.0 if camera.orthographic else max(float(np.median((roots - camera.position) @ camera.forward)), 1e-9)
+        pixels = float(np.median(np.linalg.norm(last - roots, axis=1))) * scale / away
+        count = int(np.clip(np.ceil(pixels / PIXELS_A_PIECE) + 1, FEWEST_POINTS, MOST_POINTS))
     return Coat(
-        fewer_points(coat.points, rows, points), np.asarray(coat.ids)[rows], coat.normals[rows], look,
-        None if coat.tints is None else coat.tints[rows], None if coat.widths is None else coat.widths[rows],
+        fewer_points(coat.points, rows, count), np.asarray(coat.ids)[rows], coat.normals[rows], look,
+        None if coat.tints is None else coat.tints[rows], None if coat.widths is None else coat.widths[rows], rows,
     )
 
 
-def fewer_points(points: np.ndarray, rows: NDArray[np.integer], count: int | None) -> NDArray[np.float32]:
-    """These rows of strands in their layout, with `count` of their points, first and last among them."""
+def sparse_points(coat: Coat, drawn: Coat) -> Coat:
+    """A coat made by :func:`sparse_coat`, with the points that `coat` has now."""
+    assert drawn.order is not None
+    count = drawn.points.shape[2] if coat.points.shape[1] == 3 else drawn.points.shape[1]
+    return drawn._replace(points=fewer_points(coat.points, drawn.order, count))
+
+
+def fewer_points(points: np.ndarray, rows: NDArray[np.integer], count: int) -> NDArray[np.float32]:
+    """These rows of strands in their layout, with at most `count` of their points, first and last among them."""
     by_axis = points.shape[1] == 3
     have = points.shape[2] if by_axis else points.shape[1]
     gathered = points[rows]
-    if count is not None and count < have:
+    if count < have:
         at = np.rint(np.linspace(0, have - 1, count)).astype(np.intp)
         gathered = gathered[:, :, at] if by_axis else gathered[:, at]
     return np.ascontiguousarray(gathered, np.float32)

@@ -13,6 +13,7 @@ from viewport.shaders import set_uniforms
 LARGEST_SIDE = 16384
 VALUES_AT_ONCE = 1 << 19  # floats uploaded between two steps
 POINTS_AT_ONCE = 1 << 17  # points shaded between two steps
+SMALL = 64  # rows of textures that are kept for however few strands
 
 
 class StrandTextures:
@@ -46,11 +47,12 @@ class StrandTextures:
         self.stale = np.ones(self.rows, bool)
 
     def resize(self, points: np.ndarray) -> bool:
-        """Take points of another number of strands; False when the room or the layout is another."""
+        """Take points of another number of strands; False when they do not fit, would waste room, or lie otherwise."""
         by_axis = points.shape[1] == 3
         per_strand = points.shape[2] if by_axis else points.shape[1]
         same = per_strand == self.per_strand and self.point_stride == (1 if by_axis else 3)
-        if not same or not self.rows // 2 <= -(-len(points) // self.per_row) <= self.rows:
+        wanted = -(-len(points) // self.per_row)
+        if not same or not wanted <= self.rows <= max(SMALL, 2 * wanted):
             return False
         self.count = len(points)
         self.stale[:] = True

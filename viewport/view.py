@@ -1,0 +1,270 @@
+"""The interactive view: a moving picture at the hand, a finished one at rest, marks and words over both.
+
+For a window (its OpenGL context current in every call, made with ``gc_mode="context_gc"``)::
+
+    view = View3D(ctx, text=letters_of_the_window)
+    controller = DensityController(budget_ms=26.0)
+
+    # whenever something may have changed (cheap when nothing has)
+    view.begin(scene, camera, (width, height), options)      # True when the picture must be drawn anew
+    view.rows_changed(points, rows)                          # arrays of the scene that were written to in place
+
+    # paint, while the hand moves or after a change
+    drawn = view.draw_interactive(controller.drawn)
+    view.present(framebuffer, (width, height), overlays, hud)
+
+    # at rest, from a timer of 0 ms; any change ends the iteration
+    refining = view.refine()
+    part = next(refining, None)                              # None: finished, or something changed
+    if view.picture_changed: present                         # a finer picture is there
+
+    # only the pointer moved
+    view.present(framebuffer, (width, height), overlays, hud)
+
+    view.release()                                           # before the context goes
+
+Sizes are pixels of the framebuffer (logical size times ``devicePixelRatio``). A framebuffer's own idea of its size is
+not looked at, so ``ctx.detect_framebuffer()`` of a ``QOpenGLWindow`` serves.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from core.camera import Camera
+from core.overlay import Overlay
+from core.workspace import ViewOptions
+from viewport.context import collect
+from viewport.hud import LINE, ScreenImages, TextImage, plain_text
+from viewport.kept import same
+from viewport.light_maps import LightMaps
+from viewport.moving import Moving, display_target
+from viewport.overlay_drawing import TONES, Byte3, MarkDrawing, Words, axes_marks, labels, marks
+from viewport.pictures import Pictures, read_image
+from viewport.renderer import Prepared, Renderer, light_directions
+from viewport.scene import Scene
+from viewport.shaders import program, set_uniforms
+
+SLICE_MS = 14.0  # work is added to a slice until it has taken so long; the last piece may take as long again
+FULL_PART = 0.4  # of the refinement is done when all hairs are shown
+FINISHED_SAMPLES = 2
+TEXT_PIXELS = 12.0
+HUD_MARGIN = 14.0
+
+HudLine = str | tuple[str, str]
+"""Words, or (words, tone of core.overlay.Tone)."""
+
+
+class View3D:
+    """One view of one scene. Make, use and release it with the context current.
+
+    Parameters
+    ----------
+    ctx : with ``gc_mode="context_gc"``.
+    text : draws words, see :data:`viewport.hud.TextImage`.
+    image : reads an image file as (H, W, 3 or 4) uint8 or returns None; by default through OpenCV.
+    tones : sRGB colours of the tones of overlays.
+    shadow_side : of the maps of the light of finished pictures.
+    """
+
+    def __init__(
+        self, ctx: moderngl.Context, text: TextImage = plain_text,
+        image: Callable[[str], NDArray[np.uint8] | None] = read_image, tones: Mapping[str, Byte3] = TONES,
+        shadow_side: int = 1024,
+    ) -> None:
+        self.ctx = ctx
+        self.tones = tones
+        self.renderer = Renderer(ctx, shadow_side)
+        self.moving = Moving(ctx, self.renderer)
+        self.marks = MarkDrawing(ctx)
+        self.images = ScreenImages(ctx, text)
+        self.pictures = Pictures(ctx, image)
+        self.copy = program(ctx, ("fullscreen.vert",), ("copy.frag",))
+        self.copy_triangle = ctx.vertex_array(self.copy, [])
+        self.scene = Scene()
+        self.camera: Camera | None = None
+        self.size = (0, 0)
+        self.options = ViewOptions()
+        self.picture_changed = False
+        self._given: tuple[Any, ...] | None = None
+        self._targets: list[tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer]] = []
+        self._version = 0
+        self._lit: tuple[Any, ...] | None = None  # what the finished maps of the light were drawn for
+        self._lighting: dict[str, Any] = {}
+
+    # what is shown
+
+    def begin(self, scene: Scene, camera: Camera, size: tuple[int, int], options: ViewOptions | None = None) -> bool:
+        """Say what is to be shown; True when that differs from before, which ends a refinement.
+
+        Nothing is drawn. Arrays are compared by identity, so a scene may be made anew for every frame.
+        """
+        options = ViewOptions() if options is None else options
+        size = (max(int(size[0]), 1), max(int(size[1]), 1))
+        given = (scene, camera, size, options)
+        if same(self._given, given):
+            return False
+        self._given = given
+        self.scene = scene._replace(
+            coats=scene.coats if options.hair else (), guides=scene.guides if options.guides else ()
+        )
+        self.camera, self.size, self.options = camera, size, options
+        self.renderer.backdrop.set_plate(self.pictures.pixels(options.background))
+        self.pictures.keep({options.background, *(reference.path for reference in options.references)})
+        self._version += 1
+        return True
+
+    def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
+        """Rows of an array of hairs or guides in the scene were written to in place."""
+        if len(rows):
+            self.renderer.rows_changed(points, rows)
+            self.moving.rows_changed()
+            self._version += 1
+
+    # drawing
+
+    def draw_interactive(self, hairs: int) -> int:
+        """Draw the moving picture: at most `hairs` of every coat, those on the near side; how many those are.
+
+        Follow it with :meth:`present`.
+        """
+        if self.camera is None:
+            return 0
+        self._version += 1
+        finished = None
+        if self._lit is not None and same(self._lit, self._light_key()):
+            finished = self.renderer.light_maps, self._lighting
+        shown = self.moving.draw(
+            self.scene, self.camera, self._target(0), self.size, self.options, hairs, finished
+        )
+        self.picture_changed = True
+        return shown
+
+    def refine(self) -> Iterator[float]:
+        """Make the picture finer, a slice of about 25 ms at every ``next``; the done part 0 .. 1.
+
+        First all hairs are drawn, then all of it finished. The picture changes (:attr:`picture_changed`) when a
+        finer one is complete. The iteration ends by itself when anything changes.
+        """
+        version = self._version
+        steps = self._refinement()
+        part = 0.0
+        while self._version == version:
+            start = time.perf_counter()
+            while time.perf_counter() - start < 1e-3 * SLICE_MS:
+                try:
+                    part = next(steps)
+                except StopIteration:
+                    yield 1.0
+                    return
+                self.ctx.finish()
+            yield part
+
+    def _refinement(self) -> Iterator[float]:
+        if self.camera is None:
+            return
+        scene, renderer = self.scene, self.renderer
+        lit = self._light_key()
+        self._lit = None  # the maps are being drawn anew
+        preparing = renderer.prepare(scene, self.camera, self.size, self.options)
+        prepared: Prepared | None = None
+        while prepared is None:
+            try:
+                yield 0.5 * FULL_PART * next(preparing)
+            except StopIteration as end:
+                prepared = end.value
+        self._lighting = {name: prepared.uniforms[name] for name in LightMaps.UNIFORMS}
+        self._lit = lit
+        for samples, near_only, low, high in (
+            (1, True, 0.5 * FULL_PART, FULL_PART), (FINISHED_SAMPLES, False, FULL_PART, 1.0)
+        ):
+            for part in renderer.paint(prepared, self._target(1), samples, near_only):
+                yield low + (high - low) * part
+            self._targets.reverse()
+            self.picture_changed = True
+        yield 1.0
+
+    def present(
+        self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], overlays: Sequence[Overlay] = (),
+        hud: Sequence[HudLine] = (), ratio: float = 1.0,
+    ) -> None:
+        """Copy the best picture there is and draw reference images, axes, overlays and the HUD over it.
+
+        ratio : device pixels for a logical one; words and lines grow with it. Overlays are in device pixels.
+        """
+        ctx = self.ctx
+        ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        framebuffer.use()
+        framebuffer.viewport = (0, 0, *size)
+        if self._targets:
+            self._targets[0][0].use(0)
+            set_uniforms(self.copy, {"picture": 0})
+            self.copy_triangle.render(moderngl.TRIANGLES, vertices=3)
+        self._draw_references(size)
+        rows = [marks(overlays, self.tones, ratio)]
+        words = labels(overlays, self.tones)
+        if self.options.axes and self.camera is not None:
+            lines, names = axes_marks(self.camera, size, ratio)
+            rows.insert(0, lines)
+            words += names
+        self.marks.draw(np.concatenate(rows), size, ratio)
+        if self.options.hud:
+            words += self._hud_words(hud, ratio)
+        self.images.draw_words(words, TEXT_PIXELS * ratio, size)
+        self.picture_changed = False
+
+    def _draw_references(self, size: tuple[int, int]) -> None:
+        for reference in self.options.references:
+            texture = self.pictures.texture(reference.path)
+            if texture is not None:
+                left, top, width = reference.x * size[0], reference.y * size[1], reference.width * size[0]
+                box = (left, top, left + width, top + width * texture.height / texture.width)
+                self.images.draw(texture, box, size, (1.0, 1.0, 1.0, reference.opacity))
+
+    def _hud_words(self, hud: Sequence[HudLine], ratio: float) -> list[Words]:
+        lines = [(line, "plain") if isinstance(line, str) else line for line in hud]
+        lines += [(f"{name} cannot be shown; choose another image", "trouble") for name in self.pictures.unreadable]
+        return [
+            Words(
+                HUD_MARGIN * ratio, (HUD_MARGIN + TEXT_PIXELS * (0.9 + LINE * number)) * ratio, line,
+                self.tones.get(tone, self.tones["plain"]),
+            )
+            for number, (line, tone) in enumerate(lines)
+        ]
+
+    # what is kept
+
+    def _light_key(self) -> tuple[Any, ...]:
+        assert self.camera is not None
+        toward = light_directions(self.scene, self.camera)
+        return (*self.scene.surfaces, bool(self.scene.coats), self.scene.lights, tuple(toward["key"].tolist()))
+
+    def _target(self, number: int) -> moderngl.Framebuffer:
+        """The shown picture (0) or the one being drawn (1)."""
+        if self._targets and self._targets[0][0].size != self.size:
+            self._release_targets()
+        while len(self._targets) <= number:
+            self._targets.append(display_target(self.ctx, self.size))
+        return self._targets[number][2]
+
+    def _release_targets(self) -> None:
+        for target in self._targets:
+            for thing in reversed(target):
+                thing.release()
+        self._targets = []
+
+    def release(self) -> None:
+        """Give back everything; the context must be current."""
+        self._version += 1
+        self._release_targets()
+        for thing in (
+            self.moving, self.renderer, self.marks, self.images, self.pictures, self.copy_triangle, self.copy
+        ):
+            thing.release()
+        collect(self.ctx)
