@@ -123,8 +123,8 @@ class LiveScene:
         Parameters
         ----------
         stroking : a hand moves or the timeline plays: nothing slow is asked for, what can wait waits.
-        hairs : so many hairs of the whole scene are drawn now, split as :func:`hairs_of_coats` does; only they are
-            evaluated, the rest by :meth:`catch_up`. None for all.
+        hairs : at most so many hairs of every coat are drawn now, the first of its order; only they are evaluated,
+            the rest by :meth:`catch_up`. None for all, which may take 30 ms for 100,000.
         groom : the active one; its map is shown first where several have one of the name.
         """
         self._document, self._frame, self._stroking, self._hairs = document, frame, stroking, hairs
@@ -136,8 +136,9 @@ class LiveScene:
         self._skins = {k: skin for k, skin in self._skins.items() if k[0] in meshes}
         return self._follow()
 
-    def catch_up(self, seconds: float = 0.02) -> Change | None:
-        """Spend about so long on what is owed; None when nothing is (or only what jobs will bring)."""
+    def catch_up(self, seconds: float = 0.012) -> Change | None:
+        """Spend about so long on what is owed (in creases twice as long); None when nothing is, or only what jobs
+        will bring."""
         start = time.perf_counter()
         for item, groom, posed in self._visible():
             shown, skin = self._grooms[groom.id], self._skin(item, posed)
@@ -147,7 +148,7 @@ class LiveScene:
             rows = coat.catch_up(int(np.clip(seconds * self._pace[skin is not None], SMALLEST, LARGEST)), skin)
             spent = max(time.perf_counter() - start, 1e-6)
             pace = self._pace[skin is not None]
-            self._pace[skin is not None] = min(2.0 * pace, 0.5 * (pace + len(rows) / spent))
+            self._pace[skin is not None] = min(1.25 * pace, len(rows) / spent)  # down at once, up bit by bit
             self._change = self._change._replace(rows=(Rows(coat.children.points, rows),))
             return self._change
         for item, groom, _ in self._visible():
@@ -260,16 +261,13 @@ class LiveScene:
         visible = self._visible()
         for _, groom, _ in visible:
             self._grooms.setdefault(groom.id, _Shown())
-        coats = [
-            (self._grooms[groom.id].coat, item, groom, posed) for item, groom, posed in visible
-            if self._options.hair and self._coat(groom, item) is not None
-        ]
         rows: list[Rows] = []
         troubles: list[str] = []
-        shares = _shares([0 if coat is None else len(coat.order) for coat, *_ in coats], self._hairs)
-        for (coat, _, groom, posed), share in zip(coats, shares, strict=True):
-            assert coat is not None
-            written = coat.follow(groom, self._frame, posed, share)
+        for item, groom, posed in visible:
+            coat = self._coat(groom, item)
+            if coat is None or not self._options.hair:
+                continue
+            written = coat.follow(groom, self._frame, posed, self._hairs)
             if len(written):
                 rows.append(Rows(coat.children.points, written))
             if coat.trouble is not None:
@@ -279,7 +277,7 @@ class LiveScene:
             shown = self._grooms[groom.id]
             shown.guides.follow(groom.guides, item.mesh, posed, shown.coat, workers)
             rest = self._rest_skin(item)
-            if rest is not None:
+            if rest is not None and not self._stroking:
                 shown.guides.check(CHECKED_AT_ONCE, rest, workers)
         self._change = Change(self._scene(), tuple(rows), tuple(troubles))
         return self._change
@@ -358,15 +356,3 @@ def _same_about(a: object, b: object) -> bool:
         return a.item.mesh is b.item.mesh and a.groom.coat is b.groom.coat and a.groom.maps is b.groom.maps
     return a is b
 
-
-def hairs_of_coats(scene: Scene, hairs: int | None) -> list[int]:
-    """How many hairs of each coat are drawn when `hairs` of the whole scene are: first parts of their orders."""
-    counts = [len(coat.points) if coat.order is None else len(coat.order) for coat in scene.coats]
-    return [count if share is None else share for count, share in zip(counts, _shares(counts, hairs), strict=True)]
-
-
-def _shares(counts: list[int], hairs: int | None) -> list[int | None]:
-    total = sum(counts)
-    if hairs is None or hairs >= total:
-        return [None] * len(counts)
-    return [-(-hairs * count // total) for count in counts]
