@@ -159,15 +159,17 @@ class Commands:
     def run(self, name: str) -> bool:
         """Run a command. False when it could not; the artist is told why."""
         command = self._table[name]
-        reason = command.enabled(self._window.desk)
+        reason = command.enabled(self.desk)
         if reason is not None:
-            self._window.desk.said.emit(reason)
+            self.desk.said.emit(reason)
             return False
+        if self.desk.session.stroking and command.touches in ("document", "history", "file"):
+            self.desk.end_stroke()  # what the hand has made so far counts
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
         try:
             command.run(self._window)
         except UserError as error:
-            self._window.desk.error(error)
+            self.desk.error(error)
             return False
         return True
 
@@ -201,7 +203,7 @@ def _scores(word: str, haystack: list[str]) -> list[float]:
             scores.append(90.0)
         else:
             # a short word is found inside any text by chance
-            scores.append(float(rough) - 15.0 if len(word) > 3 else 0.0)
+            scores.append(float(rough) - 15.0 if len(word) > 4 else 0.0)
     return scores
 
 

@@ -8,6 +8,7 @@ import rlcompleter
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from types import CodeType, FrameType
@@ -169,18 +170,22 @@ class _Interpreter(code.InteractiveInterpreter):
             return None  # a block goes on until an empty line or one that stands out ends it
         try:
             return self.compile(source.rstrip() + "\n" * (len(lines) > 1), FILE, "exec" if len(lines) > 1 else "single")
-        except (OverflowError, SyntaxError, ValueError):
+        except (OverflowError, SyntaxError, ValueError) as error:
             self._console.say(source + "\n")
-            self.showsyntaxerror(FILE)
+            self.write("".join(traceback.format_exception_only(error)))
             return False
 
     def showtraceback(self) -> None:
-        """Errors meant for a person are one sentence; a stopped loop is no error."""
+        """Errors meant for a person are one sentence; others come with the lines below what was typed.
+
+        Python's own would hand them to sys.excepthook, which is for faults of the program.
+        """
         error = sys.exception()
         if isinstance(error, UserError | KeyboardInterrupt):
-            self.write(f"{error or 'Stopped.'}\n")
-        else:
-            super().showtraceback()
+            self.write(f"{str(error) or 'Stopped.'}\n")
+        elif error is not None:
+            trace = error.__traceback__
+            self.write("".join(traceback.format_exception(error.with_traceback(trace and trace.tb_next))))
 
     def write(self, data: str) -> None:
         """Errors and tracebacks."""

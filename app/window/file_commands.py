@@ -74,7 +74,7 @@ FILE: tuple[Command, ...] = (
         words="movie video render animation sequence mp4"),
     Command(
         "file.quit", "Quit", "Leaves the program; work that was not saved can be recovered at the next start.",
-        lambda w: w.close(), "tools.session.Session.close", "window", words="exit close leave"),
+        lambda w: w.close(), "tools.session.Session.close", "window", icon="quit", words="exit close leave"),
 )
 
 EDIT: tuple[Command, ...] = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QObject, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractSpinBox,
@@ -41,7 +41,9 @@ class Hotkeys(QObject):
         self._actions: dict[str, QAction] = {}
         self.keymap = keymap
         self.set_keymap(keymap)
-        QGuiApplication.instance().focusObjectChanged.connect(self._follow_focus)
+        application = QApplication.instance()
+        application.focusChanged.connect(self._follow_focus)
+        application.focusWindowChanged.connect(self._follow_focus)  # the viewport is a window and no widget
 
     def set_keymap(self, keymap: Keymap) -> None:
         """Use another keymap from now on."""
@@ -124,7 +126,7 @@ class Hotkeys(QObject):
         self._commands.run(name)
         self.refresh()  # a tick that Qt set although the command could not run is taken back
 
-    def _follow_focus(self) -> None:
+    def _follow_focus(self, *_: object) -> None:
         scope = self.scope()
         for shortcut, owners in self._shortcuts.values():
             shortcut.setEnabled("everywhere" in owners or scope in owners)

@@ -26,7 +26,10 @@ WIDER = 1.35  # those aside stand further out, for words are wide
 
 
 class Entry(NamedTuple):
-    """One direction of the menu. `icon` : a file of resources/icons without suffix. `reason` : why it cannot run now, or None."""
+    """One direction of the menu.
+
+    icon : file in resources/icons without suffix, or None. reason : why it cannot run now, or None.
+    """
 
     name: str
     label: str
@@ -94,9 +97,9 @@ class RadialMenu(QWidget):
         self.update()
 
     def let_go(self) -> None:
-        """The button or key that opened the menu was released: choose, or stay open when the hand never moved."""
-        self._pressed = None
-        if math.hypot(*(self._hand - self._middle()).toTuple()) >= DEAD * self._size:
+        """A button or key was released: choose. In the middle the first release stays, a later one leaves."""
+        first, self._pressed = self._pressed is not None, None
+        if math.hypot(*(self._hand - self._middle()).toTuple()) >= DEAD * self._size or not first:
             self._choose()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -104,12 +107,11 @@ class RadialMenu(QWidget):
         self.point_to(event.globalPosition().toPoint())
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """A click chooses; in the middle it leaves."""
+        """Point; the release chooses, so that no release is left over for what lies below."""
         self.point_to(event.globalPosition().toPoint())
-        self._choose()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """The release of the button that opened the menu."""
+        """The release of the button that opened the menu, or of a later click."""
         self.point_to(event.globalPosition().toPoint())
         self.let_go()
 

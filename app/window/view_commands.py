@@ -145,16 +145,17 @@ VIEW: tuple[Command, ...] = (
     Command(
         "view.projection", "Perspective / orthographic",
         "Switches between a lens and parallel lines; what you look at keeps its size.",
-        lambda w: w.toggle_projection(), "core.camera.Camera", scope="viewport", words="ortho parallel lens",
+        lambda w: w.toggle_projection(), "core.camera.Camera", scope="viewport", icon="perspective",
+        words="ortho parallel lens",
         checked=lambda desk: bool(desk.session.workspace.cameras) and desk.session.workspace.cameras[0].orthographic),
     Command(
         "view.camera_from_file", "Camera from file…", "Looks through a shot's camera read from a USD or Alembic file.",
-        lambda w: w.camera_from_file(), "core.camera.Camera", words="shot import lens layout usd"),
+        lambda w: w.camera_from_file(), "core.camera.Camera", icon="camera", words="shot import lens layout usd"),
     *(
         Command(
             f"view.store_{n}", f"Keep view {n}", f"Keeps how you look now as view {n}, saved with the project.",
             _store(str(n)), "tools.scene.stored_bookmark", enabled=_needs_view, scope="viewport",
-            words="bookmark camera store")
+            icon="bookmark", words="bookmark camera store")
         for n in range(1, 10)
     ),
     *(
@@ -166,21 +167,22 @@ VIEW: tuple[Command, ...] = (
     *(
         Command(
             f"view.{name}", label, tooltip, _shade(name), _OPTIONS, checked=_shades(name), scope="viewport",
-            words="shading display mode")
+            icon=None if name == "lines" else name, words="shading display mode")
         for name, (label, tooltip) in SHADING_WORDS.items()
     ),
     Command(
         "view.wire_overlay", "Wire overlay", "Draws the edges of meshes over their surface, to see the layout.",
-        switch("wire"), _OPTIONS, checked=is_on("wire"), scope="viewport", words="edges wireframe lines"),
+        switch("wire"), _OPTIONS, checked=is_on("wire"), scope="viewport", icon="wire", words="edges wireframe lines"),
     Command(
         "view.grid", "Grid", "Draws the ground at height 0; one square is one metre or a tenth.",
-        switch("grid"), _OPTIONS, checked=is_on("grid"), scope="viewport", words="floor ground"),
+        switch("grid"), _OPTIONS, checked=is_on("grid"), scope="viewport", icon="grid", words="floor ground"),
     Command(
         "view.axes", "Axes", "Draws where X, Y and Z point in the corner of the view.",
-        switch("axes"), _OPTIONS, checked=is_on("axes"), scope="viewport", words="orientation gizmo"),
+        switch("axes"), _OPTIONS, checked=is_on("axes"), scope="viewport", icon="axes", words="orientation gizmo"),
     Command(
         "view.hud", "Figures in the view", "Writes tool, counts and milliseconds into the corner of the picture.",
-        switch("hud"), _OPTIONS, checked=is_on("hud"), scope="viewport", words="hud statistics stats counts"),
+        switch("hud"), _OPTIONS, checked=is_on("hud"), scope="viewport", icon="hud",
+        words="hud statistics stats counts"),
     Command(
         "view.hair", "Hair", "Shows the hairs of the coat; off shows the bare skin, which is faster.",
         switch("hair"), _OPTIONS, checked=is_on("hair"), icon="hair", scope="viewport", words="children fur coat"),
@@ -194,7 +196,7 @@ VIEW: tuple[Command, ...] = (
     Command(
         "view.ghost", "Ghost", "Shows the active mesh translucent, so that you see what lies behind.",
         _ghost, "tools.scene.ghosted", enabled=_needs_something, checked=_is_ghosted, scope="viewport",
-        words="xray x-ray transparent"),
+        icon="ghost", words="xray x-ray transparent"),
     Command(
         "view.hide", "Hide", "Hides the active mesh and its grooms, in the project too.",
         _hide, "tools.scene.hide_mesh", "document", undo="Hide", enabled=_needs_something, scope="viewport",
@@ -205,20 +207,20 @@ VIEW: tuple[Command, ...] = (
         icon="show", words="unhide reveal visible"),
     Command(
         "view.background", "Background image…", "Puts a picture behind everything in the view, fitted to its height.",
-        lambda w: w.choose_background(), _OPTIONS, words="plate photo image"),
+        lambda w: w.choose_background(), _OPTIONS, icon="image", words="plate photo image"),
     Command(
         "view.pin_reference", "Pin a reference…", "Pins a picture to the view that stays put while you turn.",
-        lambda w: w.pin_reference(), "core.workspace.Reference", words="image photo picture"),
+        lambda w: w.pin_reference(), "core.workspace.Reference", icon="image", words="image photo picture"),
     Command(
         "view.no_pictures", "Remove pictures", "Takes the background and every pinned reference out of the view.",
         _no_background, _OPTIONS, enabled=_has_images, words="background reference clear image"),
     Command(
         "view.denser", "More hair while working", "Draws half as many hairs more while your hand moves.",
-        lambda w: w.scale_density(DENSER), "viewport.view.DensityController", scope="viewport",
+        lambda w: w.scale_density(DENSER), "viewport.density.DensityController", scope="viewport",
         words="density up quality"),
     Command(
         "view.sparser", "Less hair while working", "Draws a third fewer hairs while your hand moves, for speed.",
-        lambda w: w.scale_density(1.0 / DENSER), "viewport.view.DensityController", scope="viewport",
+        lambda w: w.scale_density(1.0 / DENSER), "viewport.density.DensityController", scope="viewport",
         words="density down faster"),
 )
 

@@ -80,10 +80,10 @@ WINDOW: tuple[Command, ...] = (
         lambda w: w.show_console(), "app.commands.run.command", "window", icon="console", words="script code terminal"),
     Command(
         "window.reset_layout", "Reset the layout", "Puts every panel back where it is in a new installation.",
-        lambda w: w.reset_layout(), _WORKSPACE, words="panels docks default"),
+        lambda w: w.reset_layout(), _WORKSPACE, icon="reset", words="panels docks default"),
     Command(
         "window.full_screen", "Full screen", "Fills the whole screen with the window; again brings the frame back.",
-        lambda w: w.toggle_full_screen(), _WORKSPACE, "window", words="maximize"),
+        lambda w: w.toggle_full_screen(), _WORKSPACE, "window", icon="fullscreen", words="maximize"),
     Command(
         "window.safe_mode", "Restart without plug-ins",
         "Saves your state for recovery and starts again without a studio's own tools.",
