@@ -7,6 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
+from app.window.jobs import Jobs
 from core.document import Document
 from core.errors import UserError
 from core.groom.groom import Groom
@@ -34,6 +35,7 @@ class Desk(QObject):
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.session = session
+        self.jobs = Jobs(self)
         self._listen(session)
 
     def replace_session(self, session: Session, discard: bool = False) -> None:
