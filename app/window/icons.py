@@ -69,6 +69,7 @@ class IconButton(QToolButton):
 
     def __init__(self, name: str, tooltip: str, parent: QWidget | None = None, side: int | None = None) -> None:
         super().__init__(parent)
+        _source(name)
         self._name, self._side = name, side
         self.setToolTip(tooltip)
         self.setAccessibleName(tooltip)
@@ -77,6 +78,7 @@ class IconButton(QToolButton):
     def set_icon(self, name: str) -> None:
         """Show another icon."""
         if name != self._name:
+            _source(name)
             self._name = name
             self.update()
 
