@@ -124,7 +124,7 @@ class Commands:
     def __init__(self, window: Window) -> None:
         self._window = window
         self._table: dict[str, Command] = {}
-        self._haystack: list[str] = []
+        self._haystack: list[tuple[str, str]] = []
         self.recent: list[str] = []
 
     def __iter__(self) -> Iterator[Command]:
@@ -150,7 +150,7 @@ class Commands:
             if command.name in self._table:
                 raise ValueError(f"there are two commands {command.name}")
             self._table[command.name] = command
-            self._haystack.append(f"{command.label} {command.category} {command.words}".lower())
+            self._haystack.append((command.label.lower(), f"{command.category} {command.words}".lower()))
 
     def reason(self, name: str) -> str | None:
         """Why the command cannot run now, or None when it can."""
@@ -185,26 +185,29 @@ class Commands:
                 scores[place] += score if score >= 70.0 else -200.0
         good = [(score, c) for score, c in zip(scores, commands, strict=True) if score > 0.0]
         fresh = {name: len(self.recent) - place for place, name in enumerate(self.recent)}
-        good.sort(key=lambda pair: (-pair[0], -fresh.get(pair[1].name, 0), len(pair[1].label)))
+        good.sort(key=lambda pair: (
+            -pair[0], self.reason(pair[1].name) is not None, -fresh.get(pair[1].name, 0), len(pair[1].label)))
         return [command for _, command in good]
 
 
-def _scores(word: str, haystack: list[str]) -> list[float]:
-    """How well one typed word fits each text, 0 .. 130; a text's own words count most from their beginning."""
-    fuzzy = process.cdist([word], haystack, scorer=fuzz.partial_ratio)[0]
-    scores = []
-    for text, rough in zip(haystack, fuzzy, strict=True):
-        padded = f" {text} "
-        if f" {word} " in padded:
-            scores.append(130.0 if text.startswith(word) else 120.0)
-        elif f" {word}" in padded:
-            scores.append(115.0 if text.startswith(word) else 110.0)
-        elif word in text:
-            scores.append(90.0)
-        else:
-            # a short word is found inside any text by chance
-            scores.append(float(rough) - 15.0 if len(word) > 4 else 0.0)
-    return scores
+def _scores(word: str, haystack: list[tuple[str, str]]) -> list[float]:
+    """How well one typed word fits each label and its further words, 0 .. 130; from 70 on it fits."""
+    # a short word is found inside any text by chance
+    rough = process.cdist([word], [" ".join(texts) for texts in haystack], scorer=fuzz.partial_ratio)[0] - 15.0
+    return [
+        max(_fit(word, label), 0.75 * _fit(word, others), float(likely) if len(word) > 4 else 0.0)
+        for (label, others), likely in zip(haystack, rough, strict=True)
+    ]
+
+
+def _fit(word: str, text: str) -> float:
+    """130 for a whole word, 115 for the beginning of one (5 more at the beginning of the text), 95 within one."""
+    padded, first = f" {text} ", 5.0 * text.startswith(word)
+    if f" {word} " in padded:
+        return 125.0 + first
+    if f" {word}" in padded:
+        return 110.0 + first
+    return 95.0 if word in text else 0.0
 
 
 def switch(name: str) -> Callable[[Window], None]:

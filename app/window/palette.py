@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QAbstractListModel, QEvent, QModelIndex, QObject, QPersistentModelIndex, QRect, QSize, Qt
+from PySide6.QtCore import (
+    QAbstractListModel,
+    QEvent,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+)
 from PySide6.QtGui import QKeyEvent, QPainter
 from PySide6.QtWidgets import (
     QFrame,
@@ -16,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.window.commands import Command, Commands
+from app.window.icons import icon_names, paint_icon
 from app.window.keymap import Keymap
 from app.window.theme import look_of
 
@@ -23,6 +34,7 @@ WIDTH, ROWS = 560, 12
 REASON = Qt.ItemDataRole.UserRole
 KEY = Qt.ItemDataRole.UserRole + 1
 CATEGORY = Qt.ItemDataRole.UserRole + 2
+ICON = Qt.ItemDataRole.UserRole + 3
 
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -135,6 +147,8 @@ class FoundCommands(QAbstractListModel):
             return command.label
         if role == REASON:
             return self._commands.reason(command.name)
+        if role == ICON:
+            return command.icon
         if role == KEY:
             return self._keymap.shown(command.name)
         if role == CATEGORY:
@@ -153,7 +167,8 @@ class _Row(QStyledItemDelegate):
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         reason, theme = index.data(REASON), look_of().theme
         text, dim = theme.colour("text"), theme.colour("dim")
-        area = option.rect.adjusted(8, 0, -8, 0)
+        side = look_of().icon
+        area = option.rect.adjusted(16 + side, 0, -8, 0)
         painter.save()
         if option.state & QStyle.StateFlag.State_Selected:
             painter.setPen(Qt.PenStyle.NoPen)
@@ -161,15 +176,18 @@ class _Row(QStyledItemDelegate):
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.drawRoundedRect(option.rect.adjusted(0, 1, 0, -1), 5.0, 5.0)
             text = theme.colour("accent")
-        metrics, key, label = option.fontMetrics, index.data(KEY), index.data()
-        side = Qt.AlignmentFlag.AlignVCenter
+        metrics, key, label, name = option.fontMetrics, index.data(KEY), index.data(), index.data(ICON)
+        if name in icon_names():
+            top = option.rect.center().y() - side / 2 + 0.5
+            paint_icon(painter, name, QRectF(option.rect.left() + 8, round(top), side, side), dim if reason else text)
+        middle = Qt.AlignmentFlag.AlignVCenter
         painter.setPen(dim)
-        painter.drawText(area, side | Qt.AlignmentFlag.AlignRight, key)
+        painter.drawText(area, middle | Qt.AlignmentFlag.AlignRight, key)
         painter.setPen(dim if reason else text)
-        painter.drawText(area, side | Qt.AlignmentFlag.AlignLeft, label)
+        painter.drawText(area, middle | Qt.AlignmentFlag.AlignLeft, label)
         left = area.left() + metrics.horizontalAdvance(label) + 12
         rest = QRect(left, area.top(), area.right() - left - metrics.horizontalAdvance(key) - 12, area.height())
         painter.setPen(dim)
         words = metrics.elidedText(reason or index.data(CATEGORY), Qt.TextElideMode.ElideRight, max(rest.width(), 0))
-        painter.drawText(rest, side | Qt.AlignmentFlag.AlignLeft, words)
+        painter.drawText(rest, middle | Qt.AlignmentFlag.AlignLeft, words)
         painter.restore()

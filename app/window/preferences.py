@@ -4,36 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, get_type_hints
 
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt, QUrl, Signal
+from PySide6.QtCore import QPointF, QRectF, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
-    QCheckBox,
-    QComboBox,
     QDialog,
-    QDoubleSpinBox,
     QFileDialog,
-    QFormLayout,
     QHBoxLayout,
     QLabel,
     QLineEdit,
     QPushButton,
-    QSpinBox,
+    QSizePolicy,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from app.window.params_panel import make_field
+from app.window.sections import Row
 from app.window.settings import Settings
 from app.window.theme import look_of
 from core.field import Field, fields_of
 from core.formats.journal import state_folder
+from core.record import Record
 from tools.pen import PenSettings
 from tools.registry import PLUGINS
 
 Points = tuple[tuple[float, float], ...]
-SETTINGS_FIELDS, PEN_FIELDS = fields_of(Settings), fields_of(PenSettings)
 
 
 class SettingsOwner(Protocol):
@@ -61,11 +59,10 @@ class Preferences(QDialog):
         tabs.addTab(self._hand(), "Hand")
         tabs.addTab(self._work(), "Work")
         tabs.addTab(self._files(), "Files")
-        self.reset, close = QPushButton("Reset all", self), QPushButton("Close", self)
-        self.reset.setToolTip("Brings every preference back to that of a new installation; recent files stay.")
-        self.reset.setAutoDefault(False)
+        self.reset = _button(
+            "Reset all", "Brings every preference back to that of a new installation; recent files stay.")
         self.reset.clicked.connect(self._reset)
-        close.setAutoDefault(False)  # Return ends typing, not the window
+        close = _button("Close", "Closes this window; what was changed holds already and is kept.")
         close.clicked.connect(self.close)
         low, layout = QHBoxLayout(), QVBoxLayout(self)
         low.addWidget(self.reset)
@@ -82,108 +79,82 @@ class Preferences(QDialog):
             show(self._owner.settings)
 
     def _look(self) -> QWidget:
-        page, form = _page()
-        self._add(form, "theme")
-        self._add(form, "text_size")
-        self._add(form, "unit")
+        page, rows = _page()
+        for name in ("theme", "text_size", "unit"):
+            rows.addWidget(self._setting(name))
+        rows.addStretch(1)
         return page
 
     def _hand(self) -> QWidget:
-        page, form = _page()
-        self._add(form, "keymap")
-        keys = QPushButton("Hotkeys…", page)
-        keys.setToolTip("Shows every hotkey, and lets you press another one for a command.")
-        keys.setAutoDefault(False)
+        page, rows = _page()
+        rows.addWidget(self._setting("keymap"))
+        keys = _button("Hotkeys…", "Shows every hotkey, and lets you press another one for a command.")
         keys.clicked.connect(self._owner.show_keymap_editor)
-        form.addRow("", keys)
+        rows.addWidget(Row("", keys))
         curve = PressureCurve(page)
         curve.changed.connect(lambda points: self._change_pen("curve", points))
         self._shows.append(lambda s: curve.show_points(s.pen.curve))
-        form.addRow("Pressure", curve)
-        straight = QPushButton("Straight", page)
-        straight.setToolTip("Makes the pressure curve a straight line again: what comes in goes out.")
-        straight.setAutoDefault(False)
+        rows.addWidget(Row("Pen pressure", curve))
+        straight = _button("Straight", "Makes the pressure curve a straight line again: what comes in goes out.")
         straight.clicked.connect(lambda: self._change_pen("curve", PenSettings().curve))
-        form.addRow("", straight)
-        for name in PEN_FIELDS:
-            self._add_field(
-                form, name, PEN_FIELDS[name], lambda s, name=name: getattr(s.pen, name),
-                lambda value, name=name: self._change_pen(name, value))
+        rows.addWidget(Row("", straight))
+        for name, known in fields_of(PenSettings).items():
+            rows.addWidget(self._row(
+                PenSettings, name, known, lambda s, name=name: getattr(s.pen, name),
+                lambda value, name=name: self._change_pen(name, value)))
+        rows.addStretch(1)
         return page
 
     def _work(self) -> QWidget:
-        page, form = _page()
-        self._add(form, "history_mb")
-        self._add(form, "density_ms")
+        page, rows = _page()
+        for name in ("history_mb", "density_ms"):
+            rows.addWidget(self._setting(name))
+        rows.addStretch(1)
         return page
 
     def _files(self) -> QWidget:
-        page, form = _page()
+        page, rows = _page()
         note = QLabel(
             f"Every finished stroke is kept at once, saved or not, in {state_folder()}. After a crash the next start "
             "offers it.", page)
         note.setWordWrap(True)
-        folder = QPushButton("Show folder", page)
-        folder.setToolTip("Opens the folder of the autosaves in the file manager of this system.")
+        folder = _button("Show folder", "Opens the folder of the autosaves in the file manager of this system.")
         folder.clicked.connect(_show_state_folder)
-        form.addRow("Autosave", note)
-        form.addRow("", folder)
-        row, line, choose = QHBoxLayout(), QLineEdit(page), QPushButton("Choose…", page)
+        line = QLineEdit(page)
         line.setObjectName("plugin_folder")
         line.setPlaceholderText("none")
         line.setToolTip(
             f"Python files with a studio's own tools, read at the next start; {PLUGINS} names further folders.")
         line.editingFinished.connect(lambda: self._change("plugin_folder", line.text().strip()))
-        choose.clicked.connect(lambda: self._choose_plugins())
         self._shows.append(lambda s: line.setText(s.plugin_folder))
-        row.addWidget(line, 1)
-        row.addWidget(choose)
-        form.addRow("Plug-ins", row)
-        self.clear_recent = clear = QPushButton("Clear recent files", page)
-        clear.setToolTip("Forgets the names of the files you had open; the files themselves stay.")
-        clear.clicked.connect(lambda: self._change("recent", ()))
-        self._shows.append(lambda s: clear.setEnabled(bool(s.recent)))
-        form.addRow("", clear)
-        for button in (folder, choose, clear):
-            button.setAutoDefault(False)
+        choose = _button("Choose…", "Chooses the folder of a studio's own tools, read at the next start.")
+        choose.clicked.connect(self._choose_plugins)
+        self.clear_recent = _button(
+            "Clear recent files", "Forgets the names of the files you had open; the files themselves stay.")
+        self.clear_recent.clicked.connect(lambda: self._change("recent", ()))
+        self._shows.append(lambda s: self.clear_recent.setEnabled(bool(s.recent)))
+        rows.addWidget(note)
+        for label, widget in (
+                ("Autosaves", folder), ("Plug-ins", line), ("", choose), ("Recent files", self.clear_recent)):
+            rows.addWidget(Row(label, widget))
+        rows.addStretch(1)
         return page
 
-    def _add(self, form: QFormLayout, name: str) -> None:
-        self._add_field(
-            form, name, SETTINGS_FIELDS[name], lambda s: getattr(s, name), lambda value: self._change(name, value))
+    def _setting(self, name: str) -> QWidget:
+        return self._row(
+            Settings, name, fields_of(Settings)[name], lambda s: getattr(s, name),
+            lambda value: self._change(name, value))
 
-    def _add_field(
-        self, form: QFormLayout, name: str, known: Field, get: Callable[[Settings], Any],
-        put: Callable[[Any], None],
-    ) -> None:
-        """A row for a described field: words to choose from, a tick, or a number."""
-        editor: QWidget
-        if known.choices:
-            box = QComboBox(self)
-            box.addItems([choice.capitalize() if len(choice) > 2 else choice for choice in known.choices])
-            box.activated.connect(lambda i: put(known.choices[i]))
-            self._shows.append(lambda s: box.setCurrentIndex(known.choices.index(get(s))))
-            editor = box
-        elif isinstance(get(self._owner.settings), bool):
-            tick = QCheckBox(known.label, self)
-            tick.clicked.connect(lambda: put(tick.isChecked()))
-            self._shows.append(lambda s: tick.setChecked(get(s)))
-            editor = tick
-        else:
-            whole = isinstance(get(self._owner.settings), int)
-            spin: QSpinBox | QDoubleSpinBox = QSpinBox(self) if whole else QDoubleSpinBox(self)
-            low, high = known.hard or (0, 100)
-            spin.setRange(low, high)
-            spin.setSingleStep(known.step or (1 if whole else 0.05))
-            spin.setSuffix(f" {_UNITS.get(name, known.unit)}".rstrip())
-            spin.setKeyboardTracking(False)  # 1 of 12 must not make the text tiny while it is typed
-            spin.valueChanged.connect(lambda: put(spin.value()))
-            self._shows.append(lambda s: _show_number(spin, get(s)))
-            editor = spin
-        editor.setToolTip(known.tooltip)
-        editor.setAccessibleName(known.label)
-        editor.setObjectName(name)
-        form.addRow("" if isinstance(editor, QCheckBox) else known.label, editor)
+    def _row(
+        self, kind: type[Record], name: str, known: Field, get: Callable[[Settings], Any], put: Callable[[Any], None],
+    ) -> QWidget:
+        """The label and bar of a described field; the value counts when the hand lets go."""
+        hint = get_type_hints(kind, include_extras=True)[name]
+        bar = make_field(known, hint, get(self._owner.settings), getattr(kind(), name))
+        bar.setObjectName(name)
+        bar.edited.connect(lambda value, final: put(value) if final else None)
+        self._shows.append(lambda s: bar.set_value(get(s)))
+        return Row(known.label, bar)
 
     def _change(self, name: str, value: Any) -> None:
         if getattr(self._owner.settings, name) != value:
@@ -214,6 +185,7 @@ class PressureCurve(QWidget):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.setFixedHeight(120)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip("What the pen sends, across, and what tools get, up. Drag points; double-click adds one.")
         self.setAccessibleName("Pressure curve")
         self.points: Points = PenSettings().curve
@@ -291,20 +263,19 @@ class PressureCurve(QWidget):
         return min(max(x, 0.0), 1.0), min(max(y, 0.0), 1.0)
 
 
-_UNITS = {"history_mb": "MB", "density_ms": "ms"}
-
-
-def _page() -> tuple[QWidget, QFormLayout]:
+def _page() -> tuple[QWidget, QVBoxLayout]:
     page = QWidget()
-    form = QFormLayout(page)
-    form.setContentsMargins(12, 12, 12, 12)
-    form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
-    return page, form
+    rows = QVBoxLayout(page)
+    rows.setContentsMargins(8, 12, 8, 8)
+    rows.setSpacing(4)
+    return page, rows
 
 
-def _show_number(spin: QSpinBox | QDoubleSpinBox, value: float) -> None:
-    with QSignalBlocker(spin):
-        spin.setValue(value)
+def _button(label: str, tooltip: str) -> QPushButton:
+    button = QPushButton(label)
+    button.setToolTip(tooltip)
+    button.setAutoDefault(False)  # Return ends typing and presses nothing
+    return button
 
 
 def _show_state_folder() -> None:

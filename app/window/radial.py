@@ -22,7 +22,8 @@ MOST = 8
 DIRECTIONS = ((0, -1), (1, 0), (0, 1), (-1, 0), (1, -1), (1, 1), (-1, 1), (-1, -1))
 DEAD = 14.0  # pixels about the middle in which nothing is chosen
 RADIUS = 92.0  # pixels from the middle to the entries above and below
-WIDER = 1.35  # those aside stand further out, for words are wide
+# places in radii: words are wide, so those aside stand further out, and no two share a line
+ASIDE, BETWEEN = 1.4, (1.15, 0.6)
 
 
 class Entry(NamedTuple):
@@ -59,7 +60,7 @@ class RadialMenu(QWidget):
         self._pressed: QPointF | None = None  # on the screen, while what opened the menu is down
         self._size = self.fontMetrics().height() / 15.0  # grows with the size of the text
         widest = max((self.fontMetrics().horizontalAdvance(e.label) for e in entries if e), default=0) + 48.0
-        half_width = WIDER * RADIUS * self._size + widest / 2 + 8
+        half_width = ASIDE * RADIUS * self._size + widest / 2 + 8
         half_height = RADIUS * self._size + 32 * self._size
         self.resize(math.ceil(2 * half_width), math.ceil(2 * half_height))
 
@@ -169,5 +170,5 @@ class RadialMenu(QWidget):
 
     def _place(self, i: int) -> QPointF:
         x, y = DIRECTIONS[i]
-        far = RADIUS * self._size / math.hypot(x, y)
-        return self._middle() + QPointF(WIDER * x * far, y * far)
+        far, (wide, high) = RADIUS * self._size, BETWEEN if x and y else (ASIDE, 1.0)
+        return self._middle() + QPointF(wide * x * far, high * y * far)

@@ -45,10 +45,10 @@ class Settings(Record):
         "Units shown", "Unit of lengths in panels; the document itself stays in metres.",
         choices=("document", "m", "cm", "mm", "in", "ft"))] = "document"
     history_mb: Annotated[int, field(
-        "Memory for undo", "Megabytes kept for undo; the oldest steps are forgotten beyond it.", "", (128, 4096),
+        "Undo, MB", "Megabytes kept for undo; the oldest steps are forgotten beyond it.", "", (128, 4096),
         (16, 65536), 128)] = DEFAULT_BUDGET >> 20
     density_ms: Annotated[float, field(
-        "Time for a picture", "Milliseconds a picture may take while your hand moves; more shows more hair.", "",
+        "Picture, ms", "Milliseconds a picture may take while your hand moves; more shows more hair.", "",
         (10, 60), (5, 500), 1)] = 28.0
     pen: PenSettings = PenSettings()
     plugin_folder: str = ""

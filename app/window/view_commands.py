@@ -136,12 +136,12 @@ VIEW: tuple[Command, ...] = (
     *(
         Command(
             f"view.{side}", f"{side.capitalize()} view", tooltip, _look_from(side), _FRAMED, scope="viewport",
-            words="camera look from")
+            icon="view", words="camera look from")
         for side, tooltip in SIDES.items()
     ),
     Command(
         "view.three_quarter", "Three-quarter view", "Looks at the animal from the front, a little aside and above.",
-        _look_from("three-quarter"), _FRAMED, scope="viewport", words="camera look perspective home"),
+        _look_from("three-quarter"), _FRAMED, scope="viewport", icon="view", words="camera look perspective home"),
     Command(
         "view.projection", "Perspective / orthographic",
         "Switches between a lens and parallel lines; what you look at keeps its size.",

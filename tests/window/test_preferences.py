@@ -7,9 +7,11 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QLineEdit, QSpinBox, QTabWidget
+from PySide6.QtWidgets import QLineEdit, QTabWidget
 from pytestqt.qtbot import QtBot
 
+from app.window.choice_bar import ChoiceBar, SwitchBar
+from app.window.number_bar import NumberBar
 from app.window.preferences import Preferences, PressureCurve
 from app.window.settings import Settings, load_settings, save_settings
 from core.errors import UserError
@@ -96,34 +98,44 @@ def dialog(owner: Owner, qtbot: QtBot) -> Preferences:
 
 def test_a_choice_works_at_once(dialog: Preferences, owner: Owner, qtbot: QtBot) -> None:
     assert not dialog.isModal()
-    theme = dialog.findChild(QComboBox, "theme")
-    qtbot.keyClick(theme, Qt.Key.Key_Down)
+    theme = dialog.findChild(ChoiceBar, "theme")
+    theme.setFocus()
+    qtbot.keyClick(theme, Qt.Key.Key_Right)
     assert owner.settings.theme == "light"
 
 
 def test_a_number_counts_when_it_is_whole(dialog: Preferences, owner: Owner, qtbot: QtBot) -> None:
-    size = dialog.findChild(QSpinBox, "text_size")
-    size.selectAll()
-    qtbot.keyClicks(size, "16")
-    assert owner.settings.text_size == 12
+    size = dialog.findChild(NumberBar, "text_size")
+    size.setFocus()
     qtbot.keyClick(size, Qt.Key.Key_Return)
+    assert size.line is not None
+    qtbot.keyClicks(size.line, "16")
+    assert owner.settings.text_size == 12
+    qtbot.keyClick(size.line, Qt.Key.Key_Return)
     assert owner.settings.text_size == 16
     assert dialog.isVisible()
 
 
 def test_the_pen_is_set_up(dialog: Preferences, owner: Owner, qtbot: QtBot) -> None:
-    tabs = dialog.findChild(QTabWidget)
-    tabs.setCurrentIndex(1)
-    qtbot.mouseClick(dialog.findChild(QCheckBox, "spikes"), Qt.MouseButton.LeftButton)
+    dialog.findChild(QTabWidget).setCurrentIndex(1)
+    qtbot.mouseClick(dialog.findChild(SwitchBar, "spikes"), Qt.MouseButton.LeftButton)
     assert not owner.settings.pen.spikes
-    smoothing = dialog.findChild(QDoubleSpinBox, "smoothing")
-    smoothing.stepBy(1)
+    smoothing = dialog.findChild(NumberBar, "smoothing")
+    smoothing.setFocus()
+    qtbot.keyClick(smoothing, Qt.Key.Key_Return)
+    qtbot.keyClicks(smoothing.line, "1/4")
+    qtbot.keyClick(smoothing.line, Qt.Key.Key_Return)
     assert owner.settings.pen.smoothing == pytest.approx(0.25)
+    assert not owner.settings.pen.spikes
+
+
+def test_the_pressure_curve_is_drawn(dialog: Preferences, owner: Owner, qtbot: QtBot) -> None:
+    dialog.findChild(QTabWidget).setCurrentIndex(1)
     curve = dialog.findChild(PressureCurve)
-    start = curve.place_of((1.0, 1.0)).toPoint()
-    end = curve.place_of((1.0, 0.5)).toPoint()
+    start, end = curve.place_of((1.0, 1.0)).toPoint(), curve.place_of((1.0, 0.5)).toPoint()
     qtbot.mousePress(curve, Qt.MouseButton.LeftButton, pos=start)
     qtbot.mouseMove(curve, end)
+    assert owner.settings.pen.curve == ((0.0, 0.0), (1.0, 1.0))
     qtbot.mouseRelease(curve, Qt.MouseButton.LeftButton, pos=end)
     assert owner.settings.pen.curve[0] == (0.0, 0.0)
     assert owner.settings.pen.curve[1] == pytest.approx((1.0, 0.5), abs=0.02)
@@ -131,6 +143,13 @@ def test_the_pen_is_set_up(dialog: Preferences, owner: Owner, qtbot: QtBot) -> N
     assert len(owner.settings.pen.curve) == 3
     qtbot.mouseDClick(curve, Qt.MouseButton.LeftButton, pos=curve.place_of(owner.settings.pen.curve[1]).toPoint())
     assert len(owner.settings.pen.curve) == 2
+
+
+def test_what_changes_elsewhere_is_shown(dialog: Preferences, owner: Owner) -> None:
+    owner.change_settings(text_size=18, pen=PenSettings(curve=((0.0, 0.5), (1.0, 1.0))))
+    dialog.refresh()
+    assert dialog.findChild(NumberBar, "text_size").value() == 18
+    assert dialog.findChild(PressureCurve).points[0] == (0.0, 0.5)
 
 
 def test_files_and_reset(dialog: Preferences, owner: Owner, qtbot: QtBot) -> None:
