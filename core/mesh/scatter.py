@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.mesh.even_subset import Candidates, even_subset
 from core.mesh.normals import face_areas, face_normals
-from core.mesh.scatter_kernels import draw_candidates, even_subset, interpolate, shuffle_key
+from core.mesh.scatter_kernels import draw_candidates, interpolate, shuffled
 from core.random import rand
 from core.workers import Workers, serial_ranges
 
@@ -79,15 +80,15 @@ def scatter(
     while True:
         total = int(min(wanted, most))
         drawn = _draw(ground, total, seed, density, workers)
-        chosen, levels, dry = even_subset(*drawn, np.sqrt(ground.area), float(candidates), count)
+        chosen, levels, dry = even_subset(drawn, float(np.sqrt(ground.area)), float(candidates), count, workers)
         if len(chosen) >= count or not dry or total >= most:
             break
         wanted = 2.0 * total
-    order = np.argsort(shuffle_key(chosen, levels, seed))[:count]
+    order = shuffled(chosen, levels, seed)[:count]
     rows = chosen[order]
     barycentric = np.empty((len(rows), 3), np.float32)
     interpolate(rows.astype(np.uint32), seed, barycentric)
-    found = Scatter(ground.faces[drawn[0][rows]], barycentric)
+    found = Scatter(ground.faces[drawn.triangle[rows]], barycentric)
     return found if len(rows) == count else _complete(ground, found, count, seed)
 
 
@@ -170,12 +171,8 @@ def _morton(places: NDArray[np.float64], low: NDArray[np.float64], high: NDArray
 
 def _draw(
     ground: _Ground, total: int, seed: int, density: Density | None, workers: Workers | None
-) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    """Draw whole batches until `total` candidates; each is stratified over the faces and in their order.
-
-    Returns rows of ground faces (M,), places (M, 3), stretch of the spacing (M,; 0: not passed by the density),
-    normals of the faces, and the ends of the batches.
-    """
+) -> Candidates:
+    """Draw whole batches until `total` candidates; each is stratified over the faces and in their order."""
     ends = [FIRST_BATCH]
     while ends[-1] < total:
         ends.append(ends[-1] + max(FIRST_BATCH, int(0.16 * ends[-1])))
@@ -199,7 +196,7 @@ def _draw(
             values = (at_corners * barycentric).sum(1)
         passed = rand(keys, seed + 3) * ground.top[triangle] < values
         stretch = np.where(passed, 1.0 / np.sqrt(np.maximum(values, MAX_STRETCH**-2)), 0.0).astype(np.float32)
-    return triangle, places, stretch, ground.normals, batches
+    return Candidates(triangle, places, stretch, ground.normals, batches)
 
 
 def _complete(ground: _Ground, found: Scatter, count: int, seed: int) -> Scatter:

@@ -89,13 +89,14 @@ def test_a_prefix_holds_under_a_density_too() -> None:
 def test_the_same_seed_gives_the_same_bits_with_any_threads_and_another_seed_does_not() -> None:
     points, triangles = _sheet()
     first = scatter(points, triangles, 30_000, seed=3)
-    workers = Workers(3)
-    try:
-        again = scatter(points, triangles, 30_000, seed=3, workers=workers)
-    finally:
-        workers.close()
-    np.testing.assert_array_equal(first.triangle, again.triangle)
-    np.testing.assert_array_equal(first.barycentric, again.barycentric)
+    for threads in (2, 3, 5):
+        workers = Workers(threads)
+        try:
+            again = scatter(points, triangles, 30_000, seed=3, workers=workers)
+        finally:
+            workers.close()
+        np.testing.assert_array_equal(first.triangle, again.triangle)
+        np.testing.assert_array_equal(first.barycentric, again.barycentric)
     other = scatter(points, triangles, 30_000, seed=4)
     assert (other.triangle == first.triangle).mean() < 0.05
 
@@ -222,13 +223,16 @@ def test_count_from_a_density_per_square_metre() -> None:
 def test_a_sphere_has_no_seams() -> None:
     ball = trimesh.creation.icosphere(3)
     points, triangles = ball.vertices.astype(np.float32), ball.faces.astype(np.int32)
-    places = _places(points, triangles, scatter(points, triangles, 8000))
-    assert _evenness(places) < 0.16
-    # roots in caps of equal area, in many directions, against the binomial spread of random placing
     ways = np.random.default_rng(2).normal(size=(200, 3))
     ways /= np.linalg.norm(ways, axis=1)[:, None]
-    caps = (places / np.linalg.norm(places, axis=1)[:, None] @ ways.T > 0.9).sum(0)
-    assert caps.std() < 0.4 * np.sqrt(8000 * 0.05 * 0.95)
+    spreads = []
+    for seed in range(8):
+        places = _places(points, triangles, scatter(points, triangles, 8000, seed=seed))
+        assert _evenness(places) < 0.16
+        # roots in caps of equal area, in many directions, against the binomial spread of random placing
+        caps = (places / np.linalg.norm(places, axis=1)[:, None] @ ways.T > 0.9).sum(0)
+        spreads.append(caps.std() / np.sqrt(8000 * 0.05 * 0.95))
+    assert np.mean(spreads) < 0.39  # one seed alone comes to anything from 0.34 to 0.45
 
 
 def test_the_cat_at_every_density() -> None:
