@@ -96,6 +96,8 @@ class LightMaps:
                 if not mesh.surface.ghost:
                     mesh.draw_depth(matrix)
         yield
+        self.first_target.use()
+        ctx.enable(moderngl.DEPTH_TEST)
         for coat in coats:
             for _ in coat.draw_depth(matrix):
                 yield

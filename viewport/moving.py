@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
@@ -18,6 +18,7 @@ from viewport.renderer import Renderer, camera_uniforms, light_directions, light
 from viewport.ribbons import far_to_near
 from viewport.scene import Coat, GuideLines, Scene
 
+MOST_ACROSS = 6.0  # strands of a wide ribbon
 MAP_SIDE = 256  # of the light's maps that are drawn anew whenever the light turns
 
 
@@ -30,7 +31,10 @@ class Moving:
         self.light_maps = LightMaps(ctx, MAP_SIDE)
         self.coats: list[CoatDrawable] = []
         self.guides: list[GuideDrawable] = []
-        self.base: tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer] | None = None
+        self.base: DisplayTarget | None = None
+        self.behind: tuple[moderngl.Texture, moderngl.Framebuffer] | None = None
+        self._behind_key: tuple[Any, ...] | None = None
+        self._across: dict[int, float] = {}
         self._base_key: tuple[Any, ...] | None = None
         self._sparse_key: tuple[Any, ...] | None = None
         self._light_key: tuple[Any, ...] | None = None
@@ -58,17 +62,19 @@ class Moving:
         uniforms = camera_uniforms(scene, camera, size, to_display=True) | lighting | light_uniforms(scene, toward)
         self._draw_base(scene, camera, size, options, uniforms, maps)
         assert self.base is not None
-        self.ctx.copy_framebuffer(target, self.base[2])
+        self.ctx.copy_framebuffer(target, self.base.framebuffer)
         maps.bind()
         view_row = -view_from_world(camera)[2]
         for drawable in (*self.coats, *self.guides):
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             _finish(drawable.upload())
-            _finish(drawable.work_out(uniforms))
             shown = drawable.coat if isinstance(drawable, CoatDrawable) else drawable.lines
+            across = self._across.get(id(shown), 1.0)
+            _finish(drawable.work_out({**uniforms, "sparse": across > 1.0}))
             order = _finish(far_to_near(shown.points, view_row))
             points = np.arange(drawable.textures.per_strand)
-            _finish(self.renderer.ribbons.draw(drawable.textures, order, points, uniforms["clip_from_world"], target))
+            matrix = uniforms["clip_from_world"]
+            _finish(self.renderer.ribbons.draw(drawable.textures, order, points, matrix, target, across=across))
         return sum(len(coat.points) for _, coat in self._sparse)
 
     def _gather(self, scene: Scene, camera: Camera, size: tuple[int, int], hairs: int) -> None:
@@ -89,6 +95,10 @@ class Moving:
             lambda lines: GuideDrawable(ctx, renderer.guide_programs, lines, room=rooms[id(lines)]),
         )
         renderer.solids.upload(scene)
+        self._across = {
+            id(drawn): float(np.clip(drawn.look.root_width / max(coat.look.root_width, 1e-12), 1.0, MOST_ACROSS))
+            for coat, drawn in self._sparse
+        }
 
     def _light(self, scene: Scene, toward: np.ndarray) -> dict[str, Any]:
         key = (*scene.surfaces, self._sparse_key, tuple(toward.tolist()))
@@ -116,42 +126,71 @@ class Moving:
         if self.base is not None and same(self._base_key, key):
             return
         self._base_key = key
-        if self.base is None or self.base[0].size != size:
+        if self.base is None or self.base.color.size != size:
             self._release_base()
             self.base = display_target(self.ctx, size)
-        target = self.base[2]
+        target = self.base.framebuffer
         target.use()
         target.clear(depth=1.0)
-        self.renderer.backdrop.draw(scene, size)
+        self._draw_backdrop(scene, size)
+        target.use()
         maps.bind()
-        self.renderer.solids.draw(scene, camera, target, {**uniforms, "tap_reach": 0}, options)
+        self.renderer.solids.draw(scene, camera, target, uniforms, options, quick=True)
 
-    def forget(self) -> None:
-        """Draw everything anew next time."""
-        self._base_key = self._sparse_key = self._light_key = None
+    def _draw_backdrop(self, scene: Scene, size: tuple[int, int]) -> None:
+        """Copy the background, which does not turn with the camera, into the base."""
+        assert self.base is not None
+        key = scene.background, size, self.renderer.backdrop.image
+        if self.behind is None or not same(self._behind_key, key):
+            if self.behind is None or self.behind[0].size != size:
+                self._release_behind()
+                color = self.ctx.texture(size, 4)
+                self.behind = color, self.ctx.framebuffer([color])
+            self._behind_key = key
+            self.behind[1].use()
+            self.renderer.backdrop.draw(scene, size)
+        self.ctx.copy_framebuffer(self.base.framebuffer, self.behind[1])
 
     def _release_base(self) -> None:
         if self.base is not None:
-            for thing in reversed(self.base):
-                thing.release()
+            self.base.release()
             self.base = None
+
+    def _release_behind(self) -> None:
+        if self.behind is not None:
+            for thing in reversed(self.behind):
+                thing.release()
+            self.behind = None
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
         self._release_base()
+        self._release_behind()
         for thing in (*self.coats, *self.guides, self.light_maps):
             thing.release()
         self.coats, self.guides = [], []
 
 
-def display_target(
-    ctx: moderngl.Context, size: tuple[int, int]
-) -> tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer]:
-    """A framebuffer of displayed colours with depth."""
+class DisplayTarget(NamedTuple):
+    """Displayed colours with depth. `alone` is a framebuffer of the colours alone, to copy from where depth differs."""
+
+    color: moderngl.Texture
+    depth: moderngl.Renderbuffer
+    framebuffer: moderngl.Framebuffer
+    alone: moderngl.Framebuffer
+
+    def release(self) -> None:
+        """Give back the memory; the context must be current."""
+        for thing in (self.alone, self.framebuffer, self.depth, self.color):
+            thing.release()
+
+
+def display_target(ctx: moderngl.Context, size: tuple[int, int]) -> DisplayTarget:
+    """A new target of this size in pixels."""
     color = ctx.texture(size, 4)
     color.filter = (moderngl.NEAREST, moderngl.NEAREST)
     depth = ctx.depth_renderbuffer(size)
-    return color, depth, ctx.framebuffer([color], depth)
+    return DisplayTarget(color, depth, ctx.framebuffer([color], depth), ctx.framebuffer([color]))
 
 
 def _finish(steps: Any) -> Any:

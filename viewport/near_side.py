@@ -10,8 +10,9 @@ from viewport.scene import Coat, GuideLines
 
 AWAY = -0.35  # cosine between skin and the way to the eye below which hair is hidden by what it grows on
 FEWEST_POINTS, MOST_POINTS = 4, 8  # of a hair while the hand moves
+BLUNT = 0.6  # of its root the least width of the tip of a ribbon that stands for several hairs
 PIXELS_A_PIECE = 7.0  # of a hair of usual length
-WIDER = 0.75  # exponent: fewer hairs are wider, between what keeps one hair's look and what keeps all of the cover
+WIDER = 0.65  # exponent: fewer hairs are wider, between what keeps one hair's look and what keeps all of the cover
 
 
 def shown_rows(strands: Coat | GuideLines, camera: Camera, near_only: bool) -> NDArray[np.integer] | None:
@@ -55,10 +56,12 @@ def sparse_coat(coat: Coat, camera: Camera, hairs: int, scale: float) -> Coat:
     rows = prefix_rows(coat, hairs)
     shown = len(coat.points) if coat.order is None else len(coat.order)
     wider = (shown / max(len(rows), 1)) ** WIDER
+    blunt = BLUNT if wider > 1.0 else 0.0
     roots = roots_of(coat.points)[rows]
     near = turned_to(camera, roots, coat.normals[rows])
     rows, roots = rows[near], roots[near]
-    look = coat.look._replace(root_width=coat.look.root_width * wider, tip_width=coat.look.tip_width * wider)
+    root = coat.look.root_width * wider
+    look = coat.look._replace(root_width=root, tip_width=max(coat.look.tip_width * wider, blunt * root))
     count = MOST_POINTS
     if len(rows):
         last = coat.points[rows, :, -1] if coat.points.shape[1] == 3 else coat.points[rows, -1]

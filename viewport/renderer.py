@@ -162,7 +162,7 @@ class Renderer:
         for bottom in range(0, target.height, ROWS_AT_ONCE):
             target.scissor = (0, bottom, target.width, ROWS_AT_ONCE)
             self.light_maps.bind()
-            self.solids.draw(scene, camera, target, uniforms, prepared.options)
+            self.solids.draw(scene, camera, target, uniforms, prepared.options, samples)
             target.scissor = None
             yield 0.05 * bottom / target.height
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
@@ -229,6 +229,7 @@ def camera_uniforms(scene: Scene, camera: Camera, size: tuple[int, int], to_disp
     return {
         "clip_from_world": clip_from_world(camera, *size), "picture_size": (float(size[0]), float(size[1])),
         "pixels_at_one": pixel_scale(camera, size[1]), "exposure": scene.exposure, "to_display": to_display,
+        "sparse": False, "stands_for_hair": False,
         "eye_position": camera.position, "eye_backward": -camera.forward, "parallel_view": camera.orthographic,
     }
 

@@ -78,16 +78,22 @@ class Ribbons:
     def __init__(self, ctx: moderngl.Context) -> None:
         self.ctx = ctx
         self.program = program(ctx, ("strand_points.glsl", "ribbon.vert"), ("ribbon.frag",))
+        self.cards = program(ctx, ("strand_points.glsl", "ribbon.vert"), ("ribbon_cards.frag",))
         self.indices = ctx.buffer(reserve=SEGMENTS_AT_ONCE * 24, dynamic=True)
-        self.vertices = ctx.vertex_array(self.program, [], index_buffer=self.indices, index_element_size=4)
+        self.vertices, self.card_vertices = (
+            ctx.vertex_array(prog, [], index_buffer=self.indices, index_element_size=4)
+            for prog in (self.program, self.cards)
+        )
 
     def draw(
         self, strands: StrandTextures, order: NDArray[np.uint32], drawn: NDArray[np.intp],
         clip_from_world: NDArray[np.float64], target: moderngl.Framebuffer, samples: int = 1,
+        across: float = 1.0,
     ) -> Iterator[float]:
         """Blend the pieces into the target in the given order, testing depth but not writing it; part done, in steps.
 
-        samples : of the target for a pixel, on a side.
+        samples : of the target for a pixel, on a side. across : how many hairs a ribbon stands for; with more than
+        one it is drawn as so many strands side by side.
         """
         pieces = np.uint32(len(drawn) - 1)
         start_left, end_left = 2 * drawn[:-1], 2 * drawn[1:]
@@ -97,27 +103,29 @@ class Ribbons:
         for start in range(0, len(order), SEGMENTS_AT_ONCE):
             segments = order[start : start + SEGMENTS_AT_ONCE]
             strand, piece = np.divmod(segments, pieces)
-            vertices = corners[piece]
-            vertices += (strand * np.uint32(2 * strands.per_strand))[:, None]
+            numbers = corners[piece]
+            numbers += (strand * np.uint32(2 * strands.per_strand))[:, None]
             self.indices.orphan()
-            self.indices.write(vertices.data)
+            self.indices.write(numbers.data)
             target.use()
             target.depth_mask = False
             self.ctx.enable(moderngl.BLEND | moderngl.DEPTH_TEST)
             self.ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-            strands.bind(self.program)
+            vertices = self.card_vertices if across > 1.0 else self.vertices
+            strands.bind(vertices.program)
             strands.sides.use(1)
             strands.colors.use(2)
-            set_uniforms(self.program, {
+            set_uniforms(vertices.program, {
                 "strand_sides": 1, "strand_colors": 2, "clip_from_world": clip_from_world,
                 "picture_size": (float(target.width), float(target.height)), "samples_per_pixel": float(samples),
+                "strands_across": across,
             })
-            self.vertices.render(moderngl.TRIANGLES, vertices=6 * len(segments))
+            vertices.render(moderngl.TRIANGLES, vertices=6 * len(segments))
             target.depth_mask = True
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST)
             yield (start + len(segments)) / len(order)
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        for thing in (self.vertices, self.indices, self.program):
+        for thing in (self.vertices, self.card_vertices, self.indices, self.program, self.cards):
             thing.release()

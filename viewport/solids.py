@@ -13,7 +13,7 @@ from viewport.drawables.grid import GridDrawable
 from viewport.drawables.mesh import GHOST_OPACITY, MeshDrawable, MeshPrograms
 from viewport.drawables.strands import ABSORPTION
 from viewport.kept import matched
-from viewport.scene import Scene, scene_extent
+from viewport.scene import Color, Look, Scene, scene_extent
 
 WIRE = (0.34, 0.36, 0.40, 1.0)  # linear RGB and opacity of edges alone
 WIRE_OVER = (0.010, 0.011, 0.013, 0.55)  # over shaded triangles
@@ -21,6 +21,12 @@ WIRE_GHOST = (0.20, 0.22, 0.26, 0.25)
 FLAT = (0.060, 0.062, 0.068)  # of triangles that only hide the lines behind them
 CLAY = (0.33, 0.27, 0.235)
 PLAIN = ViewOptions(grid=False, axes=False)
+
+
+def fur_color(look: Look) -> Color:
+    """What skin under few hairs is painted in while the hand moves: as the whole coat looks from afar."""
+    r, g, b = (0.62 * root + 0.38 * tip for root, tip in zip(look.root, look.tip, strict=True))
+    return (r, g, b)
 
 
 class Solids:
@@ -38,9 +44,12 @@ class Solids:
 
     def draw(
         self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, uniforms: dict[str, Any],
-        options: ViewOptions = PLAIN,
+        options: ViewOptions = PLAIN, samples: int = 1, quick: bool = False,
     ) -> None:
-        """Draw into color and depth of the target, which were cleared."""
+        """Draw into color and depth of the target, which were cleared.
+
+        samples : of the target for a pixel, on a side. quick : light vertices alone.
+        """
         ctx = self.ctx
         target.use()
         depth = max((coat.look.depth for coat in scene.coats), default=1.0)
@@ -50,7 +59,7 @@ class Solids:
         ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
         solid = [mesh for mesh in self.meshes if not mesh.surface.ghost]
         if options.shading != "wire":
-            self._fill(solid, scene, uniforms, options.shading)
+            self._fill(solid, scene, uniforms, options.shading, quick)
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         if options.wire or options.shading in ("wire", "lines"):
@@ -60,24 +69,30 @@ class Solids:
         target.depth_mask = False
         if options.grid:
             low, high = scene_extent(scene)
-            self.grid.draw(camera, 0.5 * (low + high), uniforms)
+            self.grid.draw(camera, 0.5 * (low + high), uniforms, samples)
         ctx.enable(moderngl.CULL_FACE)
         for mesh in self.meshes:
             if mesh.surface.ghost:
-                mesh.draw({**uniforms, "opacity": GHOST_OPACITY, "manner": 1})
+                mesh.draw({**uniforms, "opacity": GHOST_OPACITY, "manner": 1}, quick=quick)
                 if options.wire or options.shading in ("wire", "lines"):
                     mesh.draw_edges(WIRE_GHOST, uniforms)
         target.depth_mask = True
         ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
 
     @staticmethod
-    def _fill(meshes: Sequence[MeshDrawable], scene: Scene, uniforms: dict[str, Any], shading: str) -> None:
+    def _fill(
+        meshes: Sequence[MeshDrawable], scene: Scene, uniforms: dict[str, Any], shading: str, quick: bool
+    ) -> None:
         for mesh in meshes:
             covered = mesh.surface.covered
             under = bool(scene.coats) if covered is None else covered
             manner = {"matcap": 1, "lines": 2}.get(shading, 0)
+            hair = quick and under and shading == "shaded"
             color = {"lines": FLAT, "matcap": mesh.surface.color if under else CLAY}.get(shading, mesh.surface.color)
-            mesh.draw({**uniforms, "covered": 1.0 if under else 0.0, "manner": manner}, color)
+            if hair and scene.coats:
+                color = fur_color(scene.coats[0].look)
+            more = {"covered": 1.0 if under else 0.0, "manner": manner, "stands_for_hair": hair}
+            mesh.draw({**uniforms, **more}, color, quick)
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""

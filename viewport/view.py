@@ -44,7 +44,7 @@ from viewport.context import collect
 from viewport.hud import LINE, ScreenImages, TextImage, plain_text
 from viewport.kept import same
 from viewport.light_maps import LightMaps
-from viewport.moving import Moving, display_target
+from viewport.moving import DisplayTarget, Moving, display_target
 from viewport.overlay_drawing import TONES, Byte3, MarkDrawing, Words, axes_marks, labels, marks
 from viewport.pictures import Pictures, read_image
 from viewport.renderer import Prepared, Renderer, light_directions
@@ -93,7 +93,7 @@ class View3D:
         self.options = ViewOptions()
         self.picture_changed = False
         self._given: tuple[Any, ...] | None = None
-        self._targets: list[tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer]] = []
+        self._targets: list[DisplayTarget] = []
         self._version = 0
         self._lit: tuple[Any, ...] | None = None  # what the finished maps of the light were drawn for
         self._lighting: dict[str, Any] = {}
@@ -202,8 +202,11 @@ class View3D:
         ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         framebuffer.use()
         framebuffer.viewport = (0, 0, *size)
-        if self._targets:
-            self._targets[0][0].use(0)
+        if self._targets and (framebuffer.glo == 0 or framebuffer.size == self.size):
+            ctx.copy_framebuffer(framebuffer, self._targets[0].alone)
+            framebuffer.use()
+        elif self._targets:
+            self._targets[0].color.use(0)
             set_uniforms(self.copy, {"picture": 0})
             self.copy_triangle.render(moderngl.TRIANGLES, vertices=3)
         self._draw_references(size)
@@ -247,16 +250,15 @@ class View3D:
 
     def _target(self, number: int) -> moderngl.Framebuffer:
         """The shown picture (0) or the one being drawn (1)."""
-        if self._targets and self._targets[0][0].size != self.size:
+        if self._targets and self._targets[0].color.size != self.size:
             self._release_targets()
         while len(self._targets) <= number:
             self._targets.append(display_target(self.ctx, self.size))
-        return self._targets[number][2]
+        return self._targets[number].framebuffer
 
     def _release_targets(self) -> None:
         for target in self._targets:
-            for thing in reversed(target):
-                thing.release()
+            target.release()
         self._targets = []
 
     def release(self) -> None:

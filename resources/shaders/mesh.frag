@@ -1,53 +1,13 @@
-// Skin: matte, lit by the same lights through the same coat; or clay, or flat; or colours of a map; or a ghost.
+// Skin, lit at every sample.
 in vec3 position;
 in vec3 normal;
 in float value;
-uniform vec3 surface_color;
-uniform float absorption;
-uniform float covered;   // 1 under a coat, where little light of the sky arrives
-uniform int manner;      // 0 in light, 1 clay (lit by the view alone), 2 flat
-uniform bool show_map;
-uniform sampler2D ramp;
-uniform float opacity;   // 1, or of a ghost: more at its edges
-uniform vec3 view_right, view_up;
 layout(location = 0) out vec4 out_color;
-
-vec3 clay(vec3 n, vec3 v, vec3 color)
-{
-    vec2 at = vec2(dot(n, view_right), dot(n, view_up));
-    float toward = clamp(dot(n, v), 0.0, 1.0);
-    float key = clamp(dot(vec3(at, toward), normalize(vec3(-0.45, 0.62, 0.65))), 0.0, 1.0);
-    float fill = clamp(0.5 + 0.5 * dot(vec3(at, toward), normalize(vec3(0.7, -0.5, 0.3))), 0.0, 1.0);
-    float edge = pow(1.0 - toward, 2.5);
-    return color * (0.16 + 1.15 * key + 0.22 * fill) * (1.0 - 0.55 * edge) + vec3(0.10) * pow(key, 24.0);
-}
-
-vec3 in_light(vec3 n, vec3 v, vec3 color)
-{
-    vec2 key = key_light(position);
-    float facing = max(dot(n, key_direction), 0.0);
-    vec3 light = key_color * key.x * exp(-key.y * absorption) * facing * 0.32;
-    light += fill_color * clamp((dot(n, fill_direction) + 0.3) / 1.3, 0.0, 1.0) * 0.45 * (1.0 - 0.7 * covered);
-    light += mix(ground_color, sky_color, 0.5 + 0.5 * dot(n, up_direction)) * 0.5 * (1.0 - 0.7 * covered);
-    vec3 h = normalize(key_direction + v);
-    vec3 gleam = key_color * key.x * facing * pow(max(dot(n, h), 0.0), 30.0) * 0.035 * (1.0 - covered);
-    float edge = pow(1.0 - clamp(dot(n, v), 0.0, 1.0), 3.0);
-    vec3 rim = rim_color * edge * clamp(dot(n, rim_direction) + 0.2, 0.0, 1.0) * 0.25 * (1.0 - covered);
-    return color * (light + rim) + gleam;
-}
 
 void main()
 {
     vec3 v = to_viewer(position);
     vec3 n = normalize(normal + 1e-12);
     if (dot(n, v) < 0.0 && !gl_FrontFacing) n = -n;
-    float toward = clamp(abs(dot(n, v)), 0.0, 1.0);
-    float alpha = opacity < 1.0 ? mix(0.55, opacity, sqrt(toward)) : 1.0;
-    vec3 light;
-    if (show_map) light = textureLod(ramp, vec2((clamp(value, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5), 0.0).rgb
-        * (0.62 + 0.38 * toward);
-    else if (manner == 2) light = surface_color;
-    else if (manner == 1) light = clay(n, v, surface_color);
-    else light = in_light(n, v, surface_color);
-    out_color = vec4(shown(light), 1.0) * alpha;
+    out_color = skin(position, n, v, value);
 }

@@ -9,6 +9,8 @@ out float from_middle;
 out float half_width;
 out vec2 boxes;
 out vec4 color;
+out float along;              // 0 root .. 1 tip
+flat out float strand_seed;
 
 void main()
 {
@@ -19,6 +21,8 @@ void main()
     ivec2 at = ivec2((strand - row * strands_per_row) * points_per_strand + point, row);
     vec4 side = texelFetch(strand_sides, at, 0);
     color = texelFetch(strand_colors, at, 0);
+    along = float(point) / float(points_per_strand - 1);
+    strand_seed = float(strand % 4096) * 0.6180339;
     half_width = side.z * samples_per_pixel;
     vec2 extent = abs(side.xy);
     boxes = vec2(max(extent.x, extent.y), max(min(extent.x, extent.y), 0.02));

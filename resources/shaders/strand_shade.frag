@@ -6,6 +6,7 @@ uniform sampler2D strand_normals;  // of the skin at the root
 uniform int strand_count;
 uniform vec2 widths;               // root and tip, metres
 uniform vec3 root_color, tip_color;
+uniform bool sparse;               // a few wide hairs stand for all
 uniform float blend;
 uniform float gloss, roughness, absorption;
 uniform mat4 clip_from_world;
@@ -44,6 +45,7 @@ void main()
     if (strand >= strand_count) discard;
     int last = points_per_strand - 1;
     float u = float(point) / float(last);
+    float up = sparse ? 1.0 - (1.0 - u) * (1.0 - u) : u;   // of a sparse coat parts are seen that others would hide
     vec3 p = strand_point(strand, point);
     vec3 before = point > 0 ? strand_point(strand, point - 1) : p;
     vec3 after = point < last ? strand_point(strand, point + 1) : p;
@@ -59,10 +61,11 @@ void main()
     float length2 = dot(line, line);
     vec2 side = length2 > 1e-12 ? vec2(-line.y, line.x) * inversesqrt(length2) : vec2(1.0, 0.0);
     float width = mix(widths.x, widths.y, u * u) * tint.a;
+    if (sparse) width = min(width, 0.3 * distance(strand_point(strand, 0), strand_point(strand, last)));
     out_side = vec4(side, min(0.5 * width * pixels_at_one / max(clip.w, 1e-6), 4096.0), 1.0);   // w <= 0 behind the eye
 
     // colour of the fibre: dark root to light tip
-    float k = clamp(u / max(2.0 * blend, 1e-3), 0.0, 1.0);
+    float k = clamp(up / max(2.0 * blend, 1e-3), 0.0, 1.0);
     vec3 body = mix(root_color, tip_color, k * k * (3.0 - 2.0 * k)) * tint.rgb;
 
     vec3 v = to_viewer(p);
@@ -72,7 +75,7 @@ void main()
     // deep hair is lit by light that other hairs scattered: the lighter the hair, the farther it gets, and the warmer
     vec3 swallowed = absorption * (1.0 - 0.55 * sqrt(clamp(body, 0.0, 1.0)));
     vec3 through = key.x * exp(-key.y * swallowed);
-    float openness = mix(0.22, 1.0, smoothstep(0.0, 0.85, u));
+    float openness = mix(0.22, 1.0, smoothstep(0.0, 0.85, up));
 
     float sin_key = sqrt(max(1.0 - dot(t, key_direction) * dot(t, key_direction), 0.0));
     float facing = clamp((dot(across, key_direction) + 0.2) / 1.2, 0.0, 1.0);

@@ -15,6 +15,8 @@ LINES_IN_VIEW = 12.0  # steps between the lower and the upper border, at least
 REACH = 7.0  # times what is seen from the lower to the upper border
 COLOR = (0.16, 0.165, 0.175)
 AXES = ((0.42, 0.075, 0.07), (0.06, 0.16, 0.42))  # along the first and the second axis of the ground
+COLOR_SHOWN = (0.395, 0.402, 0.416)  # the same on the screen, after the tone curve
+AXES_SHOWN = ((0.66, 0.225, 0.21), (0.19, 0.395, 0.66))
 
 
 class GridDrawable:
@@ -22,12 +24,19 @@ class GridDrawable:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self.ctx = ctx
-        self.program = program(ctx, ("grid.vert",), ("display.glsl", "grid.frag"))
+        self.program = program(ctx, ("grid.vert",), ("grid.frag",))
         self.vertices = ctx.vertex_array(self.program, [])
 
-    def draw(self, camera: Camera, middle: NDArray[np.float64], uniforms: dict[str, Any]) -> None:
-        """Blend the grid into the bound framebuffer; `middle` (3,) of the scene says how near its ground is."""
-        set_uniforms(self.program, {**uniforms, **grid_uniforms(camera, middle)})
+    def draw(self, camera: Camera, middle: NDArray[np.float64], uniforms: dict[str, Any], samples: int) -> None:
+        """Blend the grid into the bound framebuffer.
+
+        middle : (3,) of the scene, which says how near its ground is. samples : for a pixel, on a side.
+        """
+        colors = {} if uniforms["to_display"] else {"grid_color": COLOR, "axis_colors": AXES}
+        set_uniforms(self.program, {
+            "grid_color": COLOR_SHOWN, "axis_colors": AXES_SHOWN, **colors, **uniforms,
+            **grid_uniforms(camera, middle), "width": float(samples),
+        })
         self.vertices.render(moderngl.TRIANGLE_STRIP, vertices=4)
 
     def release(self) -> None:
@@ -58,5 +67,4 @@ def grid_uniforms(camera: Camera, middle: NDArray[np.float64]) -> dict[str, Any]
         "grid_centre": centre, "grid_right": right, "grid_forward": forward, "grid_reach": reach,
         "grid_step": float(step), "small_part": float(1.0 - 0.8 * (decades - np.floor(decades))),
         "grid_phase": tuple(np.mod(flat, 10.0 * step).tolist()), "grid_origin": tuple((-flat).tolist()),
-        "grid_color": COLOR, "axis_colors": AXES,
     }

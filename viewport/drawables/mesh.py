@@ -21,7 +21,9 @@ class MeshPrograms:
     """The programs every mesh is drawn with: in light, as depth alone, as edges; and the colours of maps."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
-        self.shaded = program(ctx, ("mesh.vert",), ("display.glsl", "lighting.glsl", "mesh.frag"))
+        skin = ("display.glsl", "lighting.glsl", "skin.glsl")
+        self.shaded = program(ctx, ("mesh.vert",), (*skin, "mesh.frag"))
+        self.quick = program(ctx, (*skin, "mesh_quick.vert"), ("mesh_quick.frag",))
         self.depth = program(ctx, ("mesh_depth.vert",), ("depth_only.frag",))
         self.edges = program(ctx, ("mesh_edges.vert",), ("display.glsl", "mesh_edges.frag"))
         self.ramp = ctx.texture((256, 1), 4, dtype="f4", data=map_colors().tobytes())
@@ -30,7 +32,7 @@ class MeshPrograms:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        for thing in (self.shaded, self.depth, self.edges, self.ramp):
+        for thing in (self.shaded, self.quick, self.depth, self.edges, self.ramp):
             thing.release()
 
 
@@ -60,10 +62,12 @@ class MeshDrawable:
         self.values = ctx.buffer(_bytes(_values(surface), np.float32))
         self.indices = ctx.buffer(_bytes(surface.triangles, np.int32))
         self.lines: tuple[moderngl.Buffer, moderngl.VertexArray, int] | None = None
-        self.shaded = ctx.vertex_array(
-            programs.shaded,
-            [(self.positions, "3f", "in_position"), (self.normals, "3f", "in_normal"), (self.values, "1f", "in_value")],
-            index_buffer=self.indices, index_element_size=4,
+        columns = [
+            (self.positions, "3f", "in_position"), (self.normals, "3f", "in_normal"), (self.values, "1f", "in_value")
+        ]
+        self.shaded, self.quick = (
+            ctx.vertex_array(program, columns, index_buffer=self.indices, index_element_size=4)
+            for program in (programs.shaded, programs.quick)
         )
         self.depth = ctx.vertex_array(
             programs.depth, [(self.positions, "3f", "in_position")], index_buffer=self.indices, index_element_size=4
@@ -93,18 +97,19 @@ class MeshDrawable:
         self.surface = surface
         return True
 
-    def draw(self, uniforms: dict[str, Any], color: Color | None = None) -> None:
+    def draw(self, uniforms: dict[str, Any], color: Color | None = None, quick: bool = False) -> None:
         """Draw in light, or as `manner` and `opacity` among the uniforms say; with them those of lighting.glsl.
 
-        color : linear RGB in the place of the surface's own.
+        color : linear RGB in the place of the surface's own. quick : light the vertices alone.
         """
         if len(self.surface.triangles):
             self.programs.ramp.use(RAMP_UNIT)
-            set_uniforms(self.programs.shaded, {
+            vertices = self.quick if quick else self.shaded
+            set_uniforms(vertices.program, {
                 "manner": 0, "opacity": 1.0, **uniforms, "surface_color": color or self.surface.color,
                 "ramp": RAMP_UNIT, "show_map": self.surface.values is not None,
             })
-            self.shaded.render(moderngl.TRIANGLES, vertices=3 * len(self.surface.triangles))
+            vertices.render(moderngl.TRIANGLES, vertices=3 * len(self.surface.triangles))
 
     def draw_edges(self, color: tuple[float, float, float, float], uniforms: dict[str, Any]) -> None:
         """Draw the edges as lines; linear RGB and opacity."""
@@ -134,7 +139,7 @@ class MeshDrawable:
     def release(self) -> None:
         """Give back the memory; the context must be current."""
         self._release_lines()
-        for thing in (self.shaded, self.depth, self.positions, self.normals, self.values, self.indices):
+        for thing in (self.shaded, self.quick, self.depth, self.positions, self.normals, self.values, self.indices):
             thing.release()
 
 
