@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from core.errors import UserError
+from core.falloff import SHAPES, Shape
 from core.groom.collide import NO_FIELD, Ranges
 from core.groom.comb_kernel import comb_rows
 from core.groom.guides import Guides
@@ -31,6 +32,7 @@ def comb(
     strength: float = 0.7,
     grip: float = 1.0,
     lay: float = 1.0,
+    shape: Shape = "flat",
     flat: float = 0.15,
     tip_first: float = 0.0,
     lift: float = 0.0,
@@ -49,7 +51,8 @@ def comb(
     strength : 0 .. 1 of the whole comb.
     grip : 0 .. 1, how firmly hair follows the ring across its length.
     lay : 0 .. 2, how fast hair turns along the stroke; 0 only bends and keeps curls.
-    flat : fraction of the radius within which the ring has its full weight.
+    shape : how the ring fades from its middle to its rim (core/falloff.py).
+    flat : of the shape "flat": the fraction of the radius within which the ring has its full weight.
     tip_first : 0 combs the whole length, 1 mostly the tips.
     lift : radians by which laid hair stands off the skin, 0 .. 1.3.
     max_bend : radians a joint may be folded to (it is never opened by force: a sharper bend stays).
@@ -84,8 +87,9 @@ def comb(
     def rows(start: int, stop: int) -> None:
         comb_rows(
             start, stop, points, guides.hold, guides.roots.frames, reach, clip, basis, float(view.width),
-            float(view.height), way, float(radius), GRIP * grip, LAY * lay, float(flat), float(tip_first), float(lift),
-            float(max_bend), skin.values, skin.origin, float(skin.cell), float(clearance), touched,
+            float(view.height), way, float(radius), GRIP * grip, LAY * lay, SHAPES.index(shape), float(flat),
+            float(tip_first), float(lift), float(max_bend), skin.values, skin.origin, float(skin.cell),
+            float(clearance), touched,
         )
 
     ranges(len(guides), rows)

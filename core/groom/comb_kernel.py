@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from core.falloff import smoothstep1
+from core.falloff import falloff1
 from core.groom.chain import first_free, read_chain, rebuild_chain, write_chain
 from core.groom.collide import F32_2D, F32_3D, F64_1D, LEAST_GRADIENT, collide_chain
 from core.mesh.distance_field import sample_gradient
@@ -166,19 +166,20 @@ def _limit_bends(q, first, limits):  # type: ignore[no-untyped-def]
     types.void(
         types.int64, types.int64, types.float32[:, :, ::1], F32_2D, F32_3D,
         types.Array(types.float32, 1, "C", readonly=True), types.float64[:, ::1], types.float64[:, ::1], f64, f64,
-        types.float64[:, ::1], f64, f64, f64, f64, f64, f64, f64, F32_3D, F64_1D, f64, f64,
+        types.float64[:, ::1], f64, f64, f64, types.int64, f64, f64, f64, f64, F32_3D, F64_1D, f64, f64,
         types.boolean[::1],
     ),
     cache=True, nogil=True, error_model="numpy",
 )
 def comb_rows(  # type: ignore[no-untyped-def]
-    start, stop, points, hold, frames, reach, clip, basis, width, height, path, radius, grip, lay, flat, tip_first,
-    lift, max_bend, values, origin, cell, clearance, touched,
+    start, stop, points, hold, frames, reach, clip, basis, width, height, path, radius, grip, lay, shape, flat,
+    tip_first, lift, max_bend, values, origin, cell, clearance, touched,
 ):
     """Comb rows start .. stop of `points` (G, P, 3) in place; `touched` (G,) tells which were changed.
 
     reach : (G,) strength per strand, 0 leaves it out. path : (K, 2) pixels. radius : pixels.
     clip, basis, width, height : see core/groom/region.py View. values, origin, cell : field, empty for none.
+    shape, flat : of the ring's weights, see core.falloff.falloff1.
     max_bend : radians per joint. clearance : fraction of the strand's length. The rest: see core/groom/comb.py.
     """
     count = points.shape[1]
@@ -250,7 +251,7 @@ def comb_rows(  # type: ignore[no-untyped-def]
                     d2 = sx * sx + sy * sy
                     w[i] = ahead[i] = 0.0
                     if d2 < radius * radius:
-                        w[i] = 1.0 - smoothstep1(flat, 1.0, math.sqrt(d2) / radius)
+                        w[i] = falloff1(shape, math.sqrt(d2) / radius, flat)
                         along = (sx * step_x + sy * step_y) / math.sqrt(step_2) / radius
                         ahead[i] = max(0.0, 1.0 + TRAIL * min(along, 0.0))
                         strongest = max(strongest, w[i])

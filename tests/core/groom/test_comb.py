@@ -302,3 +302,17 @@ def test_nothing_enters_the_skin_of_a_real_animal():
     assert true.min() > -0.02 * context.field.cell
     assert np.median(true) < 0.02 * size  # the coat does lie down
     assert np.abs(segment_lengths(g) / start - 1).max() < 1e-4
+
+
+def test_the_falloff_shapes_the_pull_across_the_ring():
+    guides, seen = fur(), view()
+    pulled = {}
+    for shape in ("smooth", "flat", "linear", "sharp", "constant"):
+        after = comb(guides, seen, [(180.0, 200.0), (230.0, 200.0)], 90.0, lay=0.0, shape=shape)
+        stays(guides, after)
+        pulled[shape] = float(np.abs(after.points - guides.points).sum())
+    assert pulled["sharp"] < pulled["linear"] < pulled["flat"] < pulled["constant"]
+    assert pulled["smooth"] < pulled["flat"]
+    same = comb(guides, seen, [(180.0, 200.0), (230.0, 200.0)], 90.0, lay=0.0)
+    assert np.array_equal(same.points, comb(guides, seen, [(180.0, 200.0), (230.0, 200.0)], 90.0, lay=0.0,
+                                            shape="flat", flat=0.15).points)
