@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from app.window.commands import Command, Window
 from core.falloff import SHAPES
 from tools.registry import Registry
-from tools.tool import BrushParams, Tool
+from tools.tool import Tool
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
@@ -19,9 +19,12 @@ _CHOOSE = "tools.session.Session.choose"
 _RESPECT = "core.workspace.Respect"
 
 
-def _needs_brush(desk: Desk) -> str | None:
-    params = desk.session.tool.params
-    return None if isinstance(params, BrushParams) else f"{desk.session.tool.label} has no ring."
+def _needs(field: str) -> Callable[[Desk], str | None]:
+    def enabled(desk: Desk) -> str | None:
+        tool = desk.session.tool
+        return None if hasattr(tool.params, field) else f"{tool.label} has no {field}: choose a tool that has one."
+
+    return enabled
 
 
 def _change(field: str, change: Callable[[Any], Any]) -> Callable[[Window], None]:
@@ -74,28 +77,28 @@ def tool_commands(registry: Registry) -> tuple[Command, ...]:
 HAND: tuple[Command, ...] = (
     Command(
         "tool.larger", "Larger brush", "Makes the ring of the brush 15 percent larger, in pixels or on the skin.",
-        _change("size", lambda v: min(v * LARGER, 4000.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        _change("size", lambda v: min(v * LARGER, 4000.0)), _CHOOSE, enabled=_needs("size"), scope="viewport",
         repeats=True, words="size radius bigger increase"),
     Command(
         "tool.smaller", "Smaller brush", "Makes the ring of the brush 13 percent smaller, in pixels or on the skin.",
-        _change("size", lambda v: max(v / LARGER, 1.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        _change("size", lambda v: max(v / LARGER, 1.0)), _CHOOSE, enabled=_needs("size"), scope="viewport",
         repeats=True, words="size radius decrease"),
     Command(
         "tool.stronger", "Stronger brush", "Adds 0.05 to the strength of the brush, at most to 1.",
-        _change("strength", lambda v: min(v + STRONGER, 1.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        _change("strength", lambda v: min(v + STRONGER, 1.0)), _CHOOSE, enabled=_needs("strength"), scope="viewport",
         repeats=True, words="strength more increase"),
     Command(
         "tool.weaker", "Weaker brush", "Takes 0.05 from the strength of the brush, at least to 0.",
-        _change("strength", lambda v: max(v - STRONGER, 0.0)), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        _change("strength", lambda v: max(v - STRONGER, 0.0)), _CHOOSE, enabled=_needs("strength"), scope="viewport",
         repeats=True, words="strength less decrease"),
     Command(
         "tool.falloff", "Next falloff", "Goes through the ways the brush fades from its middle to its rim.",
-        _change("falloff", _next_falloff), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        _change("falloff", _next_falloff), _CHOOSE, enabled=_needs("falloff"), scope="viewport",
         words="cycle shape soft hard"),
     Command(
         "tool.world_size", "Brush size on the skin",
         "Keeps the ring the same size on the skin when you zoom; off keeps it in pixels.",
-        _change("world", lambda on: not on), _CHOOSE, enabled=_needs_brush, scope="viewport",
+        _change("world", lambda on: not on), _CHOOSE, enabled=_needs("size"), scope="viewport",
         checked=lambda desk: bool(getattr(desk.session.tool.params, "world", False)), words="units screen pixels"),
     Command(
         "tool.symmetry", "Symmetry X", "Makes every stroke on the other side of the animal too, across its X = 0.",

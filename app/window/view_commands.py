@@ -26,7 +26,7 @@ SIDES = {
     "top": "Looks down at the animal from straight above its back.",
     "bottom": "Looks up at the animal from straight below its belly.",
 }
-_FRAMED = "core.camera.frame_points"
+_TURNED = "core.navigate.turned_to"
 _OPTIONS = "core.workspace.ViewOptions"
 _WORKSPACE = "core.workspace.Workspace"
 
@@ -129,23 +129,25 @@ def _step(frames: int) -> Callable[[Window], None]:
 VIEW: tuple[Command, ...] = (
     Command(
         "view.frame_all", "Frame all", "Moves the camera so that everything shown fits the view.",
-        lambda w: w.frame_all(), _FRAMED, icon="frame-all", scope="viewport", words="home fit zoom everything"),
+        lambda w: w.frame_all(), "core.navigate.frame", icon="frame-all", scope="viewport",
+        words="home fit zoom everything"),
     Command(
         "view.frame_selected", "Frame selected", "Moves the camera so that the selected guides fill the view.",
-        lambda w: w.frame_selected(), _FRAMED, icon="frame-selected", scope="viewport", words="focus fit zoom"),
+        lambda w: w.frame_selected(), "core.navigate.frame", icon="frame-selected", scope="viewport",
+        words="focus fit zoom"),
     *(
         Command(
-            f"view.{side}", f"{side.capitalize()} view", tooltip, _look_from(side), _FRAMED, scope="viewport",
+            f"view.{side}", f"{side.capitalize()} view", tooltip, _look_from(side), _TURNED, scope="viewport",
             icon="view", words="camera look from")
         for side, tooltip in SIDES.items()
     ),
     Command(
         "view.three_quarter", "Three-quarter view", "Looks at the animal from the front, a little aside and above.",
-        _look_from("three-quarter"), _FRAMED, scope="viewport", icon="view", words="camera look perspective home"),
+        _look_from("three-quarter"), _TURNED, scope="viewport", icon="view", words="camera look perspective home"),
     Command(
         "view.projection", "Perspective / orthographic",
         "Switches between a lens and parallel lines; what you look at keeps its size.",
-        lambda w: w.toggle_projection(), "core.camera.Camera", scope="viewport", icon="perspective",
+        lambda w: w.toggle_projection(), "core.navigate.with_projection", scope="viewport", icon="perspective",
         words="ortho parallel lens",
         checked=lambda desk: bool(desk.session.workspace.cameras) and desk.session.workspace.cameras[0].orthographic),
     Command(

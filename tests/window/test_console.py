@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import time
+from typing import Any
 
 import pytest
 from PySide6.QtCore import QCoreApplication, Qt
@@ -126,9 +128,7 @@ def test_tab_completes(console: Console, qtbot: QtBot) -> None:
 @pytest.mark.parametrize("loop", ["while True: pass\n", "import time\nwhile True: time.sleep(0.01)"])
 def test_a_runaway_loop_is_stopped_by_esc(console: Console, host: Host, loop: str) -> None:
     before = host.desk.document
-    # the key waits in the queue while the loop runs, as that of a person does
-    QCoreApplication.postEvent(
-        console.input, QKeyEvent(QKeyEvent.Type.KeyPress, Qt.Key.Key_Escape, Qt.KeyboardModifier.NoModifier))
+    press_escape(console)
     assert console.run(loop)
     assert console.output.toPlainText().endswith("Stopped.\n")
     assert host.desk.document is before
@@ -142,3 +142,31 @@ def test_other_keys_do_not_reach_the_window_meanwhile(console: Console, host: Ho
             console.input, QKeyEvent(QKeyEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, key.name[-1]))
     console.run("while True: pass\n")
     assert console.input.toPlainText() == ""
+
+
+def press_escape(console: Console) -> None:
+    """The key waits in the queue while a loop runs, as that of a person does."""
+    QCoreApplication.postEvent(
+        console.input, QKeyEvent(QKeyEvent.Type.KeyPress, Qt.Key.Key_Escape, Qt.KeyboardModifier.NoModifier))
+
+
+def test_a_stopped_edit_leaves_the_document_as_it_was(console: Console, host: Host) -> None:
+    before = host.desk.document
+    press_escape(console)
+    console.run("def forever(document):\n    while True: pass\n")
+    console.run("session.edit('Forever', forever)")
+    assert console.output.toPlainText().endswith("Stopped.\n")
+    assert host.desk.document is before
+    assert host.desk.session.history.undo_name is None
+
+
+def test_the_program_itself_is_not_stopped_midway(console: Console) -> None:
+    house: dict[str, Any] = {"__name__": "app.window.some_panel", "time": time, "done": []}
+    exec(  # a function whose module is one of ours
+        "def draw():\n    end = time.monotonic() + 0.7\n    while time.monotonic() < end: pass\n    done.append(1)",
+        house)
+    console.names["draw"] = house["draw"]
+    press_escape(console)
+    console.run("draw()\nprint('drawn')\nwhile True: pass\n")
+    assert house["done"] == [1]
+    assert console.output.toPlainText().endswith("drawn\nStopped.\n")
