@@ -51,11 +51,13 @@ class LiveGuides:
             return
         self._posed = posed
         at_rest = posed.points is mesh.points
+        hung = live is not None and live.guides is guides
         if not (same_pose and same_roots):
-            self._normals = root_normals(mesh, guides.roots, None if at_rest else posed.points)
+            at = (None, None) if at_rest else posed
+            self._normals = live.guide_normals if live is not None and hung else root_normals(mesh, guides.roots, *at)
         if at_rest:
             self._points = guides.points
-        elif live is not None and live.guides is guides and live.guide_points.shape == guides.points.shape:
+        elif live is not None and hung and live.guide_points.shape == guides.points.shape:
             self._points = live.guide_points
         else:
             self._points = strands_on_deformed(mesh, guides.roots, guides.points, *posed)

@@ -53,6 +53,7 @@ class LiveCoat:
     mesh : what it grows on, at rest. guides : those the hairs hang on now, as the document has them.
     children : the hairs; their rows keep their places. normals : (N, 3) float32 of the skin at their roots.
     guide_points : (G, P, 3) float32, the guides on the skin in its pose, with as many points as the hairs have.
+    guide_normals : (G, 3) float32 of the skin at their roots.
     order : (M,) int32, rows of the hairs shown at the density of the coat, any first part of it an even coat.
     trouble : why the values of the coat cannot be evaluated (the hairs stay as they were), or None.
 
@@ -186,7 +187,7 @@ class LiveCoat:
         if len(rows):
             everything = len(rows) == len(self.children)
             evaluate(
-                self.children, self.guide_points, self._guide_normals, self._workers,
+                self.children, self.guide_points, self.guide_normals, self._workers,
                 rows=None if everything else rows, shape=self.children.traits.shape,
             )
 
@@ -201,9 +202,8 @@ class LiveCoat:
         """Guides on the skin as it is now; `moved` (G,) says which differ where only their points do."""
         guides, points, normals = self._fitted, *self._posed
         if moved is None:
-            self._guide_normals = root_normals(
-                self.mesh, guides.roots, None if self._posed is self._at_rest else points
-            )
+            at = (None, None) if self._posed is self._at_rest else (points, normals)
+            self.guide_normals = root_normals(self.mesh, guides.roots, *at)
         if self._posed is self._at_rest:
             self.guide_points = guides.points
         elif moved is None:
@@ -244,10 +244,7 @@ class LiveCoat:
 
     def _follow_values(self, groom: Groom, frame: float) -> None:
         before = self._groom
-        if (
-            before is not None and groom.coat is before.coat and groom.maps is before.maps
-            and (frame == self._frame or not any(_animated(getattr(groom.coat, name)) for name in COAT_VALUES))
-        ):
+        if before is not None and _same_values(before, groom) and (frame == self._frame or not _animated(groom)):
             return
         self._groom, self._frame = groom, frame
         children = self.children
@@ -283,11 +280,21 @@ def _fitted(guides: Guides, count: int) -> Guides:
     return guides if guides.points.shape[1] == count else with_point_count(guides, count)
 
 
-def _animated(value: Value) -> bool:
-    """True when the value may be another at another frame."""
-    if isinstance(value.base, Formula):
-        return "frame" in names_used(value)
-    return not isinstance(value.base, Constant)
+def _same_values(a: Groom, b: Groom) -> bool:
+    """True when no hair can be another, whatever else of the coats differs."""
+    return a.maps is b.maps and all(
+        getattr(a.coat, name) is getattr(b.coat, name) or getattr(a.coat, name) == getattr(b.coat, name)
+        for name in (*COAT_VALUES, "seed", "length_map")
+    )
+
+
+def _animated(groom: Groom) -> bool:
+    """True when hairs may be others at another frame."""
+    values: list[Value] = [getattr(groom.coat, name) for name in COAT_VALUES]
+    return any(
+        "frame" in names_used(value) if isinstance(value.base, Formula) else not isinstance(value.base, Constant)
+        for value in values
+    )
 
 
 def _same(a: Number, b: Number) -> bool:

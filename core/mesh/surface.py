@@ -69,9 +69,17 @@ def root_positions(mesh: Mesh, roots: Roots, points: NDArray[np.float32] | None 
     return out
 
 
-def root_normals(mesh: Mesh, roots: Roots, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-    """Smooth unit normals at the roots, (N, 3) float32, at rest (the stored ones) or at deformed `points`."""
-    return np.ascontiguousarray(root_frames(mesh, roots, points)[:, 2])
+def root_normals(
+    mesh: Mesh,
+    roots: Roots,
+    points: NDArray[np.float32] | None = None,
+    normals: NDArray[np.float32] | None = None,
+) -> NDArray[np.float32]:
+    """Smooth unit normals at the roots, (N, 3) float32, at rest (the stored ones) or at deformed `points`.
+
+    normals : (V, 3) float32, vertex normals at `points`, where the caller has them.
+    """
+    return np.ascontiguousarray(root_frames(mesh, roots, points, normals)[:, 2])
 
 
 def root_frames(
