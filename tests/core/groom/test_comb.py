@@ -311,8 +311,8 @@ def test_the_falloff_shapes_the_pull_across_the_ring():
         after = comb(guides, seen, [(180.0, 200.0), (230.0, 200.0)], 90.0, lay=0.0, shape=shape)
         stays(guides, after)
         pulled[shape] = float(np.abs(after.points - guides.points).sum())
-    assert pulled["sharp"] < pulled["linear"] < pulled["flat"] < pulled["constant"]
-    assert pulled["smooth"] < pulled["flat"]
+    assert pulled["sharp"] < pulled["linear"] < pulled["constant"]
+    assert pulled["smooth"] < pulled["flat"] < pulled["constant"]
     same = comb(guides, seen, [(180.0, 200.0), (230.0, 200.0)], 90.0, lay=0.0)
     assert np.array_equal(same.points, comb(guides, seen, [(180.0, 200.0), (230.0, 200.0)], 90.0, lay=0.0,
                                             shape="flat", flat=0.15).points)
