@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 FILE = "<console>"
 MOST_LINES = 5000
+MOST_COMPLETIONS = 200
 PATIENCE = 0.3  # seconds a line may take before the window is kept alive beside it
 BEAT = 0.05
 STEP = "Console"
@@ -85,9 +86,6 @@ class Console(QWidget):
 
     def run(self, source: str) -> bool:
         """Run Python. False when it is only the beginning of something, which waits for its further lines."""
-        session = self._desk.session
-        self.names |= {"session": session, "document": session.document}
-        shown = session.document
         compiled = self._interpreter.compiled(source)
         if compiled is None:
             return False
@@ -96,11 +94,13 @@ class Console(QWidget):
         self._place = len(self.history)
         if isinstance(compiled, CodeType):
             out, errors = _Writer(self, False), _Writer(self, True)
-            with redirect_stdout(out), redirect_stderr(errors), _stoppable():
-                self._interpreter.runcode(compiled)
-        mine = self.names.get("document")
-        if isinstance(mine, Document) and mine is not shown and mine is not self._desk.session.document:
-            self._desk.session.commit(STEP, mine)
+            with self._at_hand(), redirect_stdout(out), redirect_stderr(errors):
+                shown = self.names["document"]
+                with _stoppable():
+                    self._interpreter.runcode(compiled)
+                mine = self.names.get("document")
+                if isinstance(mine, Document) and mine is not shown and mine is not self._desk.session.document:
+                    self._desk.session.commit(STEP, mine)
         return True
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -129,6 +129,16 @@ class Console(QWidget):
             return True
         return False
 
+    @contextmanager
+    def _at_hand(self) -> Iterator[None]:
+        """The session and its document by name, only meanwhile: a name left behind would keep an old one alive."""
+        self.names |= {"session": self._desk.session, "document": self._desk.session.document}
+        try:
+            yield
+        finally:
+            self.names.pop("session", None)
+            self.names.pop("document", None)
+
     def _recall(self, step: int) -> bool:
         place = self._place + step
         if not 0 <= place <= len(self.history):
@@ -144,11 +154,11 @@ class Console(QWidget):
         if not word:
             cursor.insertText("    ")
             return
-        session = self._desk.session
-        self.names |= {"session": session, "document": session.document}
-        completer, found = rlcompleter.Completer(self.names), []
-        while len(found) < 200 and (match := completer.complete(word, len(found))) is not None:
-            found.append(match)
+        found: list[str] = []
+        with self._at_hand():
+            completer = rlcompleter.Completer(self.names)
+            while len(found) < MOST_COMPLETIONS and (match := completer.complete(word, len(found))) is not None:
+                found.append(match)
         common = _common_start(found)
         if len(common) > len(word):
             cursor.insertText(common.removeprefix(word))

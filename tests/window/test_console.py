@@ -63,6 +63,12 @@ def test_an_assignment_to_document_is_a_step(console: Console, host: Host, qtbot
     assert host.desk.session.history.redo_name == "Console"  # to look is no step
 
 
+def test_no_document_is_kept_alive(console: Console, host: Host) -> None:
+    console.run("document = document.replace(unit='cm')")
+    console.run("session")
+    assert not {"document", "session"} & set(console.names)
+
+
 def test_edits_of_the_session_are_steps_too(console: Console, host: Host, qtbot: QtBot) -> None:
     typed(console, qtbot, "session.edit('Half', lambda d: d.replace(fps=d.fps / 2))")
     assert host.desk.session.history.undo_name == "Half"

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit, QTreeWidget, QTreeWidgetItem
+from PySide6.QtGui import QGuiApplication, QWindow
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit, QTreeWidget, QTreeWidgetItem, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.window import keymap as keymaps
@@ -221,3 +223,20 @@ def test_a_file_that_is_no_keymap_is_refused(editor: KeymapEditor, tmp_path: Pat
     with pytest.raises(UserError, match=r"other\.json"):
         editor.import_from(tmp_path / "other.json")
     assert editor.keymap is before
+
+
+def test_keys_over_the_native_window_of_the_viewport_run_commands(
+        host: Host, hotkeys: Hotkeys, tree: QTreeWidget, qtbot: QtBot) -> None:
+    viewport = QWindow()
+    container = QWidget.createWindowContainer(viewport, host)
+    host.setCentralWidget(container)
+    container.show()
+    tree.setFocus()
+    viewport.requestActivate()
+    qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is viewport)
+    assert hotkeys.scope() == "viewport"
+    QTest.keyClick(viewport, Qt.Key.Key_H)
+    assert host.desk.document.meshes[0].hidden
+    tree.setFocus()
+    tree.window().activateWindow()
+    qtbot.waitUntil(lambda: hotkeys.scope() == "outliner")
