@@ -78,14 +78,15 @@ def draw(
     from viewport.document_scene import scene_of  # GL is loaded only when a picture is asked for
 
     shown = posed_document(document, None, evaluator) if skins is None else skins
-    _picture(path, scene_of(document, shown, children), size, _turned(VIEWS[view], shown))
+    first = next(iter(shown.values()), None)
+    direction = VIEWS[view] if first is None else turned_view(VIEWS[view], first)
+    _picture(path, scene_of(document, shown, children), size, direction)
 
 
-def _turned(view: tuple[float, float, float], skins: Mapping[int, Skin]) -> tuple[float, float, float]:
-    """The view, turned about the vertical so that front is where the first animal looks."""
-    skin = next(iter(skins.values()), None)
-    nose = -1 if skin is None else nose_vertex(skin.points, skin.triangles.vertices)
-    if skin is None or nose < 0:
+def turned_view(view: tuple[float, float, float], skin: Skin) -> tuple[float, float, float]:
+    """The view, turned about the vertical so that front is where an animal looks."""
+    nose = nose_vertex(skin.points, skin.triangles.vertices)
+    if nose < 0:
         return view
     ahead = skin.points[nose] - 0.5 * (skin.points.min(axis=0) + skin.points.max(axis=0))
     quarter = round(np.arctan2(ahead[0], ahead[2]) / (0.5 * np.pi)) * 0.5 * np.pi
