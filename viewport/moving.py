@@ -135,7 +135,7 @@ class Moving:
         self._draw_backdrop(scene, size)
         target.use()
         maps.bind()
-        self.renderer.solids.draw(scene, camera, target, uniforms, options, quick=True)
+        self.renderer.solids.draw(scene, camera, target, {**uniforms, "tap_reach": 0}, options, quick=True)
 
     def _draw_backdrop(self, scene: Scene, size: tuple[int, int]) -> None:
         """Copy the background, which does not turn with the camera, into the base."""

@@ -22,7 +22,7 @@ from viewport.scene import Scene, direction, scene_extent
 from viewport.solids import PLAIN, Solids
 
 LARGEST_TILE = 4096  # samples on a side
-ROWS_AT_ONCE = 256  # of samples of the meshes, drawn between two steps
+SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps
 
 Progress = Callable[[float], object]
 
@@ -135,7 +135,12 @@ class Renderer:
             painted = self._paint_tile(prepared, samples, tile, orders, pieces)
             yield from _scaled(painted, 0.1 + 0.9 * number / len(tiles), 0.1 + 0.9 * (number + 1) / len(tiles))
             assert self.tile is not None
-            self.backdrop.resolved(self.tile[0], scene, size, samples, tile, framebuffer)
+            rows = max(1, 2 * SAMPLES_AT_ONCE // (tile[2] * samples**2))
+            for bottom in range(0, tile[3], rows):
+                framebuffer.scissor = (tile[0], tile[1] + bottom, tile[2], min(rows, tile[3] - bottom))
+                self.backdrop.resolved(self.tile[0], scene, size, samples, tile, framebuffer)
+                framebuffer.scissor = None
+                yield 0.1 + 0.9 * (number + 1) / len(tiles)
         yield 1.0
 
     def _upload(self, scene: Scene) -> Iterator[float]:
@@ -159,8 +164,9 @@ class Renderer:
         target.use()
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         uniforms = {**prepared.uniforms, "clip_from_world": matrix}
-        for bottom in range(0, target.height, ROWS_AT_ONCE):
-            target.scissor = (0, bottom, target.width, ROWS_AT_ONCE)
+        rows = max(1, SAMPLES_AT_ONCE // target.width)
+        for bottom in range(0, target.height, rows):
+            target.scissor = (0, bottom, target.width, rows)
             self.light_maps.bind()
             self.solids.draw(scene, camera, target, uniforms, prepared.options, samples)
             target.scissor = None
