@@ -20,6 +20,7 @@ from core.groom.groom import COAT_VALUES, Groom, Map
 from core.groom.grow import scattered
 from core.groom.guides import Guides
 from core.groom.resample import with_point_count
+from core.groom.rows import take_rows
 from core.mesh.mesh import Mesh
 from core.mesh.scatter import Scatter
 from core.mesh.skin import Posed, skin_at_rest
@@ -90,7 +91,7 @@ class LiveCoat:
         self.order = self.children.row_of
         self.normals = np.zeros((n, 3), np.float32)
         self.guides = groom.guides
-        self._fitted = _fitted(groom.guides, self.children.count)
+        self._rest_points = _fitted(groom.guides, self.children.count)
         self._groom: Groom | None = None
         self._frame = frame
         self.trouble: UserError | None = None
@@ -200,19 +201,19 @@ class LiveCoat:
 
     def _stand_guides(self, moved: NDArray[np.bool_] | None = None) -> None:
         """Guides on the skin as it is now; `moved` (G,) says which differ where only their points do."""
-        guides, points, normals = self._fitted, *self._posed
+        roots, at_rest, points, normals = self.guides.roots, self._rest_points, *self._posed
         if moved is None:
             at = (None, None) if self._posed is self._at_rest else (points, normals)
-            self.guide_normals = root_normals(self.mesh, guides.roots, *at)
+            self.guide_normals = root_normals(self.mesh, roots, *at)
         if self._posed is self._at_rest:
-            self.guide_points = guides.points
+            self.guide_points = at_rest
         elif moved is None:
-            self.guide_points = strands_on_deformed(self.mesh, guides.roots, guides.points, points, normals)
+            self.guide_points = strands_on_deformed(self.mesh, roots, at_rest, points, normals)
         elif moved.any():
             rows = np.flatnonzero(moved)
             self.guide_points = self.guide_points.copy()
             self.guide_points[rows] = strands_on_deformed(
-                self.mesh, guides.roots.take(rows), guides.points[rows], points, normals
+                self.mesh, roots.take(rows), at_rest[rows], points, normals
             )
 
     def _follow_guides(self, guides: Guides) -> None:
@@ -229,15 +230,21 @@ class LiveCoat:
 
     def _hang_on(self, guides: Guides) -> None:
         """Take over guides the binding serves already."""
-        old, self.guides = self._fitted, guides
-        new = self._fitted = _fitted(guides, self.children.count)
-        if old.ids is new.ids and old.roots is new.roots:
-            moved = moved_guides(old.points, new.points, self._workers.ranges)
+        old, self.guides = self.guides, guides
+        count, ranges = self.children.count, self._workers.ranges
+        if old.ids is guides.ids and old.roots is guides.roots and old.points.shape == guides.points.shape:
+            moved = moved_guides(old.points, guides.points, ranges)
+            if guides.points.shape[1] == count:
+                self._rest_points = guides.points
+            elif moved.any():
+                self._rest_points = self._rest_points.copy()
+                self._rest_points[moved] = _fitted(take_rows(guides, moved), count)
             self._stand_guides(moved)
         else:
-            moved = np.ones(len(new), np.bool_)
-            _, before, after = np.intersect1d(old.ids, new.ids, return_indices=True)
-            moved[after] = moved_guides(old.points[before], new.points[after], self._workers.ranges)
+            before, self._rest_points = self._rest_points, _fitted(guides, count)
+            moved = np.ones(len(guides), np.bool_)
+            _, was, now = np.intersect1d(old.ids, guides.ids, return_indices=True)
+            moved[now] = moved_guides(before[was], self._rest_points[now], ranges)
             self._stand_guides()
         if moved.any():
             self._owed[self.children.rows_of(moved, self._workers.ranges)] = EVALUATE
@@ -276,8 +283,9 @@ def _growth_key(groom: Groom) -> tuple[object, ...]:
     return coat.count, coat.seed, coat.points, _density_map(groom)
 
 
-def _fitted(guides: Guides, count: int) -> Guides:
-    return guides if guides.points.shape[1] == count else with_point_count(guides, count)
+def _fitted(guides: Guides, count: int) -> NDArray[np.float32]:
+    """The points of guides, (G, count, 3)."""
+    return guides.points if guides.points.shape[1] == count else with_point_count(guides, count).points
 
 
 def _same_values(a: Groom, b: Groom) -> bool:

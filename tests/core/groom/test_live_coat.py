@@ -108,12 +108,7 @@ class Follower(RuleBasedStateMachine):
 
     @rule(change=st.sampled_from([{"seed": 3}, {"count": 700}, {"points": 9}, {"density_map": "short"}]))
     def grow_others(self, change):
-        groom = self.groom.replace(coat=self.groom.coat.replace(**change))
-        if self.live.needs_growth(groom, self.mesh):
-            self.follow(groom, 100)  # the old coat stands in
-            self.live = LiveCoat(groom, self.mesh, EVALUATOR, self.frame, rows_shown=50)
-        self.groom = groom
-        assert not self.live.needs_growth(groom, self.mesh)
+        self.follow(self.groom.replace(coat=self.groom.coat.replace(**change)), 100)
 
     @rule(frame=st.integers(1001, 1010))
     def go(self, frame):
@@ -136,6 +131,9 @@ class Follower(RuleBasedStateMachine):
         assert np.all(np.diff(rows) > 0)
         points = self.live.children.points
         assert np.isfinite(points[self.live.order[:shown]]).all()
+        if self.live.needs_growth(groom, self.mesh):  # the old coat stood in
+            self.live = LiveCoat(groom, self.mesh, EVALUATOR, self.frame, rows_shown=50)
+            assert not self.live.needs_growth(groom, self.mesh)
 
     def teardown(self):
         if hasattr(self, "live"):
