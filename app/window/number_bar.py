@@ -112,6 +112,7 @@ class NumberBar(FieldWidget):
             self.line.left.connect(self._left)
             self.line.given_up.connect(lambda: self._close_line(True))
             self.line.setGeometry(self.rect())
+            QWidget.setTabOrder(self, self.line)  # so that Tab goes on from here
             self.line.show()
             self.line.setFocus(Qt.FocusReason.OtherFocusReason)
             if text is None:

@@ -23,9 +23,9 @@ _KINDS = {"m": "a length", "rad": "an angle", "s": "a time", "px": "pixels", "fr
 _LONGEST = 6  # decimals
 
 _QUANTITY = re.compile(
-    r"(?<![A-Za-z0-9_.])((?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)[ \t]*([A-Za-zµ°]+)(?![A-Za-z0-9_(])"
+    r"(?<![A-Za-z0-9_.])((?>(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?))[ \t]*([A-Za-zµ°]+)(?![A-Za-z0-9_(])"
 )
-_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(,[0-9]{3})+(\.[0-9]*)?")
+_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(,[0-9]{3})+(\.[0-9]*)?[ \t]*[A-Za-zµ°]*")
 _WORDS = frozenset({"if", "else", "and", "or", "not"})
 
 

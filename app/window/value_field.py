@@ -237,6 +237,10 @@ class ValueField(QWidget):
         (self.line if isinstance(self._value.base, Formula) else self.bar).setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _expression_left(self, text: str) -> None:
+        """Clicking elsewhere takes what can be read; what cannot, and a line nobody wrote in, is given up."""
+        if not self.line.isModified():
+            self._show()
+            return
         try:
             expression.parse(text, {*self._names, *self._maps})
         except ExpressionError:
