@@ -15,7 +15,7 @@ from types import CodeType, FrameType
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeyEvent, QTextCharFormat, QTextCursor
+from PySide6.QtGui import QKeyEvent, QTextCharFormat, QTextCursor, QTextFormat
 from PySide6.QtWidgets import QApplication, QPlainTextEdit, QVBoxLayout, QWidget
 
 import core
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 FILE = "<console>"
 MOST_LINES = 5000
+TROUBLE = QTextFormat.Property.UserProperty  # of text that is red
 MOST_COMPLETIONS = 200
 PATIENCE = 0.3  # seconds a line may take before the window is kept alive beside it
 BEAT = 0.05
@@ -66,22 +67,20 @@ class Console(QWidget):
         layout.addWidget(self.output, 1)
         layout.addWidget(self.input)
         self.setFocusProxy(self.input)
-        self.take_look()
+        self._take_look()
         self.say(WELCOME + "\n")
 
-    def take_look(self) -> None:
-        """Use the font of the theme, whose size may have changed."""
-        for part in (self.output, self.input):
-            part.setFont(code_font(look_of()))
-        self.input.setFixedHeight(5 * self.input.fontMetrics().lineSpacing() + 12)
+    def changeEvent(self, event: QEvent) -> None:
+        """Another theme or size of text."""
+        if event.type() == QEvent.Type.StyleChange:
+            self._take_look()
+        super().changeEvent(event)
 
     def say(self, text: str, trouble: bool = False) -> None:
         """Add words to the output, red for trouble."""
-        shape = QTextCharFormat()
-        shape.setForeground(look_of().theme.colour("trouble_text" if trouble else "text"))
         cursor = QTextCursor(self.output.document())
         cursor.movePosition(QTextCursor.MoveOperation.End)
-        cursor.insertText(text, shape)
+        cursor.insertText(text, _trouble() if trouble else QTextCharFormat())
         self.output.verticalScrollBar().setValue(self.output.verticalScrollBar().maximum())
 
     def run(self, source: str) -> bool:
@@ -129,13 +128,30 @@ class Console(QWidget):
             return True
         return False
 
+    def _take_look(self) -> None:
+        for part in (self.output, self.input):
+            part.setFont(code_font(look_of()))
+        self.input.setFixedHeight(5 * self.input.fontMetrics().lineSpacing() + 12)
+        cursor, block = QTextCursor(self.output.document()), self.output.document().begin()
+        while block.isValid():  # what is not red follows the palette by itself
+            for piece in block:
+                fragment = piece.fragment()
+                if fragment.charFormat().hasProperty(TROUBLE):
+                    cursor.setPosition(fragment.position())
+                    cursor.setPosition(
+                        fragment.position() + fragment.length(), QTextCursor.MoveMode.KeepAnchor)
+                    cursor.setCharFormat(_trouble())
+            block = block.next()
+
     @contextmanager
     def _at_hand(self) -> Iterator[None]:
         """The session and its document by name, only meanwhile: a name left behind would keep an old one alive."""
         self.names |= {"session": self._desk.session, "document": self._desk.session.document}
+        before, sys.displayhook = sys.displayhook, _show  # Python's own keeps the last value as _
         try:
             yield
         finally:
+            sys.displayhook = before
             self.names.pop("session", None)
             self.names.pop("document", None)
 
@@ -164,6 +180,18 @@ class Console(QWidget):
             cursor.insertText(common.removeprefix(word))
         elif len(found) > 1:
             self.say("   ".join(match.rpartition(".")[2] for match in found) + "\n")
+
+
+def _trouble() -> QTextCharFormat:
+    shape = QTextCharFormat()
+    shape.setForeground(look_of().theme.colour("trouble_text"))
+    shape.setProperty(TROUBLE, True)
+    return shape
+
+
+def _show(value: object) -> None:
+    if value is not None:
+        print(repr(value))
 
 
 class _Interpreter(code.InteractiveInterpreter):

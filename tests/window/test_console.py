@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import time
+import weakref
 from typing import Any
 
 import pytest
 from PySide6.QtCore import QCoreApplication, Qt
 from PySide6.QtGui import QKeyEvent, QTextCursor
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.window.console import Console, _common_start, _last_word
-from app.window.theme import look_of
+from app.window.console import TROUBLE, Console, _common_start, _last_word
+from app.window.theme import apply, load_theme, look_of
 from tests.window.host import Host
 
 
@@ -38,7 +41,8 @@ def colour_at_end(console: Console) -> str:
     cursor.movePosition(QTextCursor.MoveOperation.End)
     cursor.movePosition(QTextCursor.MoveOperation.PreviousCharacter)
     cursor.movePosition(QTextCursor.MoveOperation.PreviousCharacter)
-    return cursor.charFormat().foreground().color().name()
+    shape = cursor.charFormat()
+    return shape.foreground().color().name() if shape.hasProperty(TROUBLE) else ""
 
 
 def test_an_expression_shows_its_value(console: Console, qtbot: QtBot) -> None:
@@ -67,6 +71,10 @@ def test_no_document_is_kept_alive(console: Console, host: Host) -> None:
     console.run("document = document.replace(unit='cm')")
     console.run("session")
     assert not {"document", "session"} & set(console.names)
+    document = weakref.ref(host.desk.document)
+    host.commands.run("file.new")
+    gc.collect()
+    assert document() is None
 
 
 def test_edits_of_the_session_are_steps_too(console: Console, host: Host, qtbot: QtBot) -> None:
@@ -106,7 +114,20 @@ def test_errors_are_red_and_harm_nothing(console: Console, host: Host, qtbot: Qt
     assert host.desk.session.history.undo_name is None
     assert sys.stdout is out
     typed(console, qtbot, "2 + 2")
-    assert colour_at_end(console) == look_of().theme.text
+    assert colour_at_end(console) == ""
+
+
+def test_another_theme_recolours_what_was_said(console: Console) -> None:
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    console.run("1 / 0")
+    try:
+        apply(application, load_theme("light"), 14)
+        assert colour_at_end(console) == load_theme("light").trouble_text
+        assert console.output.font().pixelSize() == 14
+    finally:
+        apply(application, load_theme("dark"))
+    assert colour_at_end(console) == load_theme("dark").trouble_text
 
 
 def test_up_and_down_go_through_what_was_typed(console: Console, qtbot: QtBot) -> None:
