@@ -159,12 +159,12 @@ class Commands:
     def run(self, name: str) -> bool:
         """Run a command. False when it could not; the artist is told why."""
         command = self._table[name]
+        if self.desk.session.stroking and command.touches in ("document", "history", "file"):
+            self.desk.end_stroke()  # what the hand has made so far counts
         reason = command.enabled(self.desk)
         if reason is not None:
             self.desk.said.emit(reason)
             return False
-        if self.desk.session.stroking and command.touches in ("document", "history", "file"):
-            self.desk.end_stroke()  # what the hand has made so far counts
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
         try:
             command.run(self._window)

@@ -10,10 +10,11 @@ import pytest
 from app.window.all_commands import all_commands
 from app.window.commands import Command
 from app.window.icons import icon_names
-from core.camera import Camera, look_at
+from core.camera import Camera, frame_points, look_at
 from core.errors import UserError
 from tests.window.host import Host
 from tools.registry import Registry
+from tools.tool import Pointer, Sight
 
 TABLE = all_commands(Registry(()))
 EVERY = pytest.mark.parametrize("command", TABLE, ids=[command.name for command in TABLE])
@@ -167,6 +168,9 @@ def test_the_brush_and_what_it_respects(host: Host) -> None:
     for _ in range(30):
         host.commands.run("tool.weaker")
     assert host.desk.session.tool.params.strength == 0.0
+    host.desk.choose("comb", falloff="constant")
+    host.commands.run("tool.falloff")
+    assert host.desk.session.tool.params.falloff == "smooth"
     host.commands.run("tool.falloff")
     assert host.desk.session.tool.params.falloff == "flat"
     host.commands.run("tool.world_size")
@@ -178,6 +182,22 @@ def test_the_brush_and_what_it_respects(host: Host) -> None:
         assert getattr(host.desk.workspace.respect, name) is not before
         assert command.checked is not None
         assert command.checked(host.desk) is not before
+
+
+def test_undo_amidst_a_stroke_takes_the_stroke_back(host: Host) -> None:
+    before = host.desk.document
+    camera = frame_points(before.grooms[0].guides.points.reshape(-1, 3), (0.0, -0.3, -1.0))
+    host.commands.run("tool.comb")
+    hand, sight = host.desk.session.hand, Sight(camera, 300, 300)
+    hand.press(sight, Pointer(120.0, 120.0))
+    hand.move((Pointer(180.0, 150.0),))
+    assert host.desk.document is not before
+    host.commands.run("view.grid")
+    assert host.desk.session.stroking  # to look otherwise disturbs no stroke
+    assert host.commands.run("edit.undo")
+    assert not host.desk.session.stroking
+    assert host.desk.document is before
+    assert host.desk.session.history.redo_name == "Comb"
 
 
 def test_theme_and_text(host: Host) -> None:
