@@ -42,6 +42,7 @@ class Hotkeys(QObject):
         self.keymap = keymap
         self.set_keymap(keymap)
         application = QApplication.instance()
+        assert isinstance(application, QApplication)
         application.focusChanged.connect(self._follow_focus)
         application.focusWindowChanged.connect(self._follow_focus)  # the viewport is a window and no widget
 

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.window import keymap as keymaps
-from app.window.commands import Commands
+from app.window.commands import Commands, Scope
 from app.window.keymap import Keymap, normal, shown
 from app.window.settings import write_whole
 from core.errors import UserError
@@ -199,7 +199,7 @@ class KeymapEditor(QDialog):
         """Write the keymap to a file; UserError when the disk refuses."""
         write_whole(path, self.keymap)
 
-    def _scopes(self) -> dict[str, keymaps.Scope]:
+    def _scopes(self) -> dict[str, Scope]:
         return {command.name: command.scope for command in self._commands}
 
     def _assign(self, name: str | None, keys: tuple[str, ...]) -> None:

@@ -65,11 +65,11 @@ class Palette(QFrame):
         layout.setSpacing(8)
         layout.addWidget(self.line)
         layout.addWidget(self.list)
-        self.line.textChanged.connect(self.find)
+        self.line.textChanged.connect(self.look_up)
         self.line.installEventFilter(self)
         self.list.clicked.connect(lambda index: self._run(index.row()))
         self.setFocusProxy(self.line)
-        self.find("")
+        self.look_up("")
 
     def open_over(self, window: QWidget) -> None:
         """Show the palette in the upper middle of a window, ready to type."""
@@ -82,7 +82,7 @@ class Palette(QFrame):
         self.activateWindow()
         self.line.setFocus()
 
-    def find(self, words: str) -> None:
+    def look_up(self, words: str) -> None:
         """List the commands that fit the words, best first."""
         self.model.find(words)
         if self.model.rowCount():
