@@ -95,6 +95,7 @@ class Shelf(QWidget):
         painter = QPainter(self)
         theme = look_of().theme
         painter.fillRect(self.rect(), theme.colour("panel"))
+        painter.fillRect(self.width() - 1, 0, 1, self.height(), theme.colour("line"))
 
     def menu(self) -> QMenu:
         """The tools that do not fit."""

@@ -314,9 +314,29 @@ def test_the_column_stands_in_line(qtbot: QtBot, qapp: QApplication, desk: Desk,
         assert metrics.horizontalAdvance(row.label.text()) <= row.label.width(), row.label.text()
     picture = tmp_path / f"column_{theme}_{size}.png"
     assert window.grab().save(str(picture))
-    colours = _colours(QImage(str(picture)))
-    assert tuple(look.theme.colour("panel").getRgb()[:3]) in colours
-    assert tuple(look.theme.colour("fill").getRgb()[:3]) in colours
+    shares = _shares(QImage(str(picture)))
+    for name in ("panel", "field", "fill"):
+        assert shares[tuple(look.theme.colour(name).getRgb()[:3])] > 0.01, name
+
+
+def test_another_text_size_and_theme_reach_what_is_shown_already(qtbot: QtBot, qapp: QApplication, desk: Desk) -> None:
+    window = demo(desk)
+    shown(qtbot, window, 700, 1400)
+    bar = next(bar for bar in window.findChildren(NumberBar) if bar.isVisible())
+    shelf = window.findChild(Shelf)
+    assert shelf is not None
+    small = bar.height(), shelf.sizeHint().width(), bar.fontMetrics().height()
+    look = apply(qapp, load_theme("light"), 18)
+    qtbot.waitUntil(lambda: bar.height() == look.row)
+    qtbot.waitUntil(lambda: shelf.buttons["comb"].isVisible() and shelf.buttons["comb"].width() == look.shelf)
+    large = bar.height(), shelf.sizeHint().width(), bar.fontMetrics().height()
+    assert all(b > a for a, b in zip(small, large, strict=True))
+    picture = _shares(window.grab().toImage())
+    dark = load_theme("dark")
+    for name in ("panel", "field", "fill"):  # a rim of a letter may have any colour between
+        assert picture.get(tuple(dark.colour(name).getRgb()[:3]), 0.0) < 0.001, name
+        assert picture[tuple(look.theme.colour(name).getRgb()[:3])] > 0.01, name
+    apply(qapp, load_theme("dark"), 12)
 
 
 def demo(desk: Desk) -> QWidget:
@@ -341,7 +361,9 @@ def demo(desk: Desk) -> QWidget:
     return window
 
 
-def _colours(image: QImage) -> set[tuple[int, int, int]]:
+def _shares(image: QImage) -> dict[tuple[int, ...], float]:
+    """The share of the picture that each colour covers."""
     image = image.convertToFormat(QImage.Format.Format_RGB32)
     pixels = np.frombuffer(image.constBits(), np.uint8).reshape(-1, 4)[:, 2::-1].copy()
-    return {tuple(int(c) for c in row) for row in np.unique(pixels, axis=0)}  # type: ignore[misc]
+    colours, counts = np.unique(pixels, axis=0, return_counts=True)
+    return {tuple(int(c) for c in row): n / len(pixels) for row, n in zip(colours, counts, strict=True)}
