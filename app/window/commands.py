@@ -118,7 +118,7 @@ class Command(NamedTuple):
 class Commands:
     """All commands of one window by name.
 
-    recent : names of those last used, newest first.
+    recent : names of those last used, newest first. noted : called with the name of every command before it runs.
     """
 
     def __init__(self, window: Window) -> None:
@@ -126,6 +126,7 @@ class Commands:
         self._table: dict[str, Command] = {}
         self._haystack: list[tuple[str, str]] = []
         self.recent: list[str] = []
+        self.noted: Callable[[str], object] | None = None
 
     def __iter__(self) -> Iterator[Command]:
         return iter(self._table.values())
@@ -166,6 +167,8 @@ class Commands:
             self.desk.said.emit(reason)
             return False
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
+        if self.noted is not None:
+            self.noted(name)
         try:
             command.run(self._window)
         except UserError as error:
