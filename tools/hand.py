@@ -14,18 +14,19 @@ import msgspec
 import numpy as np
 
 from core.camera import clip_from_world
-from core.document import find_groom, find_mesh, with_groom
+from core.document import Document, find_groom, find_mesh, with_groom
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.groom.guides import Guides
 from core.groom.region import View
-from core.mesh.surface import rest_from_posed, strands_on_deformed
 from core.overlay import Circle, Overlays
 from core.posed import skin_at
-from core.record import freeze
 from core.workspace import Respect
 from tools.pen import Pen, PenSettings
-from tools.tool import BrushParams, Ground, Pointer, Sight, Stroke, Tool, ring_radius
+from tools.pose import back_to_rest, in_pose
+from tools.respect import respected, restored
+from tools.ring import RingParams, ring_radius
+from tools.tool import Ground, Picks, Pointer, Sight, Stroke, Tool
 
 if TYPE_CHECKING:
     from tools.session import Session
@@ -113,11 +114,15 @@ class Hand:
         except BaseException:
             self.cancel()
             raise
-        record = self._record
+        record, strokes = self._record, self._strokes
         batches = tuple(self._batches)
+        changed = document is not self.session.history.current
         self._drop()
         self.session.commit(tool.step, document)
-        if self.recorded is not None and record is not None:
+        for stroke, _ in strokes[:1]:
+            if isinstance(stroke, Picks) and stroke.picked:
+                self.session.remember(tool.name, stroke.picked)
+        if changed and self.recorded is not None and record is not None:
             self.recorded(record._replace(batches=batches))
 
     def cancel(self) -> None:
@@ -156,8 +161,8 @@ class Hand:
             tool = self._tool or self.tool_for(pointer)
             grounds = self._grounds(sight, tool) if self._tool is None else tuple(g for _, g in self._strokes)
             found = tool.hover(grounds[0], pointer)
-            for ground in grounds[1:]:
-                found += _ghost(tool, grounds[0], ground, pointer)
+            if len(grounds) > 1:
+                found += _ghost(tool, grounds[0], pointer)
         except UserError:
             return ()
         for stroke, _ in self._strokes[:1]:
@@ -165,10 +170,18 @@ class Hand:
         return found
 
     def tool_for(self, pointer: Pointer) -> Tool[Any]:
-        """The active tool, or what held keys turn it into."""
-        tool = self.session.tool
-        other = tool.with_shift if pointer.shift else tool.with_ctrl if pointer.ctrl else ""
-        return self.session.tool_named(other) if other and other in self.session.tools else tool
+        """The active tool, or what the eraser end of the pen or held keys turn it into."""
+        session, tool = self.session, self.session.tool
+        turn = (
+            tool.with_eraser if pointer.eraser else tool.with_shift if pointer.shift
+            else tool.with_ctrl if pointer.ctrl else None
+        )
+        if turn is None or turn.tool not in session.tools:
+            return tool
+        params = dict(session.workspace.params.get(turn.tool, {}))
+        if isinstance(tool.params, RingParams) and issubclass(session.tools.tools[turn.tool].Params, RingParams):
+            params |= {name: getattr(tool.params, name) for name in RingParams.__struct_fields__}
+        return session.tools.make(turn.tool, {**params, **turn.params})
 
     def _extend(self, pointers: tuple[Pointer, ...]) -> None:
         try:
@@ -195,28 +208,31 @@ class Hand:
         item = find_mesh(document, groom.mesh_id)
         if item.locked:
             raise UserError(f"{item.name} is locked; unlock it in the scene panel to edit its hair.")
-        key = (groom, item, workspace.frame, workspace.respect, sight.camera, sight.width, sight.height, type(tool))
+        key = (
+            groom, item, workspace.frame, workspace.respect, sight.camera, sight.width, sight.height, document.unit,
+            tool.at_rest, tool.edits,
+        )
         if self._ground is not None and all(a is b or a == b for a, b in zip(self._ground[0], key, strict=True)):
             return self._ground[1]
         frame, evaluator = workspace.frame, session.evaluator
         skin, rest = skin_at(item, frame, evaluator), skin_at(item, None, evaluator)
-        guides = _respected(groom.guides, workspace.respect, tool)
+        guides = respected(groom.guides, workspace.respect, tool.edits)
         if not tool.at_rest and skin is not rest:
-            carried = strands_on_deformed(item.mesh, guides.roots, guides.points, skin.points, skin.normals)
-            guides = guides.replace(points=freeze(carried))
+            guides = in_pose(guides, skin)
         matrix = clip_from_world(sight.camera, sight.width, sight.height)
         sides = (matrix, matrix @ MIRROR) if workspace.respect.symmetry else (matrix,)
         grounds = tuple(
             Ground(
                 sight, View(side, sight.width, sight.height), item, frame, skin, rest, groom, guides, evaluator,
-                groom.guides.next_id,
+                document.unit, tool.at_rest,
+                side is not matrix,
             )
             for side in sides
         )
         self._ground = (key, grounds)
         return grounds
 
-    def _document(self, guides: Guides) -> Any:
+    def _document(self, guides: Guides) -> Document:
         """The document with these guides in place of those at press."""
         assert self._tool is not None
         ground = self._strokes[0][1]
@@ -225,9 +241,8 @@ class Hand:
             return document
         before = ground.groom.guides
         if not self._tool.at_rest and ground.skin is not ground.rest:
-            guides = _at_rest(guides, ground)
-        respect = self.session.workspace.respect
-        guides = _restored(before, guides, respect, self._tool)
+            guides = back_to_rest(guides, ground.guides, before, ground.skin)
+        guides = restored(before, guides, self.session.workspace.respect, self._tool.edits)
         groom: Groom = ground.groom.replace(guides=guides)
         return with_groom(document, groom)
 
@@ -236,51 +251,16 @@ class Hand:
         self._strokes, self._batches = [], []
 
 
-def _respected(guides: Guides, respect: Respect, tool: Tool[Any]) -> Guides:
-    """Guides with hold and selection taken off where they are not to be heeded."""
-    if not respect.hairspray and tool.edits not in ("hold", "selection") and guides.hold.any():
-        guides = guides.replace(hold=np.zeros_like(guides.hold))
-    if not respect.selection and tool.edits != "selection" and guides.selected.any():
-        guides = guides.replace(selected=np.zeros_like(guides.selected))
-    return guides
-
-
-def _restored(before: Guides, guides: Guides, respect: Respect, tool: Tool[Any]) -> Guides:
-    """Hold and selection that were taken off, put back on the guides that are still there."""
-    hold = not respect.hairspray and tool.edits not in ("hold", "selection") and before.hold.any()
-    selected = not respect.selection and tool.edits != "selection" and before.selected.any()
-    if not (hold or selected):
-        return guides
-    changes: dict[str, Any] = {}
-    order = np.argsort(before.ids, kind="stable")
-    place = np.minimum(np.searchsorted(before.ids, guides.ids, sorter=order), len(order) - 1)
-    row = order[place]
-    there = before.ids[row] == guides.ids
-    if hold and before.hold.shape[1] == guides.hold.shape[1]:
-        changes["hold"] = np.where(there[:, None], before.hold[row], guides.hold)
-    if selected:
-        changes["selected"] = np.where(there, before.selected[row], guides.selected)
-    return guides.replace(**changes)
-
-
-def _at_rest(guides: Guides, ground: Ground) -> Guides:
-    """Guides of the pose carried back to rest; those that were not touched keep their bits."""
-    before = ground.groom.guides
-    if guides.points is ground.guides.points:
-        return guides.replace(points=before.points)
-    points = rest_from_posed(ground.rest.mesh, guides.roots, guides.points, ground.skin.points, ground.skin.normals)
-    if guides.ids is before.ids or np.array_equal(guides.ids, before.ids):
-        same = (guides.points == ground.guides.points).all(axis=(1, 2))
-        points[same] = before.points[same]
-    return guides.replace(points=freeze(points))
-
-
-def _ghost(tool: Tool[Any], ground: Ground, mirrored: Ground, pointer: Pointer) -> Overlays:
+def _ghost(tool: Tool[Any], ground: Ground, pointer: Pointer) -> Overlays:
     """A fainter ring where the stroke works on the other side."""
+    if not isinstance(tool.params, RingParams):
+        return ()
     hit = ground.hit(pointer)
-    if hit is None or not isinstance(tool.params, BrushParams):
+    if hit is None:
         return ()
-    pixels, w = ground.view.pixels(hit.point * [-1.0, 1.0, 1.0])
-    if w <= 0.0:
+    _, near = ground.view.pixels(hit.point)
+    place, far = ground.view.pixels(hit.point * [-1.0, 1.0, 1.0])
+    if far <= 0.0:
         return ()
-    return (Circle(float(pixels[0]), float(pixels[1]), ring_radius(tool.params, mirrored, pointer), "faint"),)
+    radius = ring_radius(tool.params, ground, pointer) * float(near / far)
+    return (Circle(float(place[0]), float(place[1]), radius, "faint"),)

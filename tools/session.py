@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from tools.registry import Registry
 from tools.tool import Tool
 
 Listener = Callable[[Document, Document], None]
+FIRST_TOOL = "comb"
 
 
 class Session:
@@ -120,9 +121,9 @@ class Session:
 
     @property
     def tool(self) -> Tool[Any]:
-        """The active tool with the parameters of the workspace; the first of the shelf when that names none."""
-        name = self.workspace.tool
-        return self.tool_named(name if name in self.tools else next(iter(self.tools)).name)
+        """The active tool with the parameters of the workspace; the comb when that names none."""
+        name = next(name for name in (self.workspace.tool, FIRST_TOOL, *self.tools.tools) if name in self.tools)
+        return self.tool_named(name)
 
     def tool_named(self, name: str) -> Tool[Any]:
         """A tool with the parameters the workspace has for it."""
@@ -147,9 +148,14 @@ class Session:
         UserError
             There is no such tool, or a parameter is not as it should be.
         """
+        self.remember(name, params)
+        self.set_workspace(tool=name)
+
+    def remember(self, name: str, params: Mapping[str, Any]) -> None:
+        """Change some parameters of a tool without taking it into the hand (errors as of :meth:`choose`)."""
         wanted = {**self.workspace.params.get(name, {}), **params}
         self.tools.make(name, wanted)
-        self.set_workspace(tool=name, params={**self.workspace.params, name: wanted})
+        self.set_workspace(params={**self.workspace.params, name: wanted})
 
     def preview(self, document: Document) -> None:
         """Show a value without a step: what a stroke looks like while it goes on."""
@@ -171,6 +177,7 @@ class Session:
 
         When it raises, the document is as before.
         """
+        self.hand.cancel()
         self.cancel()
         self.commit(name, function(self.history.current, *args, **parameters))
 
@@ -211,6 +218,7 @@ class Session:
         self.evaluator.close()
 
     def _go(self, move: Callable[[], Document], name: str) -> None:
+        self.hand.cancel()
         before = self.history.current
         document = move()
         if document is not before:

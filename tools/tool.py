@@ -8,8 +8,11 @@ respected: those belong to :class:`tools.hand.Hand`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +21,19 @@ from core.camera import Camera, pixel_scale
 from core.document import MeshObject
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.falloff import SHAPES
-from core.field import field
 from core.groom.groom import Groom
 from core.groom.guides import Guides
 from core.groom.region import View
 from core.mesh.bvh import cast_rays
 from core.mesh.distance_field import DistanceField
 from core.mesh.skin import Skin
-from core.overlay import Circle, Overlays
+from core.overlay import Overlays
 from core.posed import field_at
 from core.record import Record
-
-Edits = Literal["shape", "hold", "selection", "nothing"]
+from tools.pose import in_pose
+from tools.respect import Edits
+from tools.ring import RingParams, ring_overlays
+from tools.screen import Screen
 
 
 class Pointer(NamedTuple):
@@ -74,7 +77,9 @@ class Ground:
 
     skin : in the pose shown at `frame`. rest : at rest, where roots are planted.
     guides : at press, in the pose shown (at rest for tools with ``at_rest``), with what is not respected taken off.
-    seed : of this stroke, for everything random in it.
+    unit : of length, what numbers are shown in (core.document.METRES_PER_UNIT).
+    at_rest : the tool works at rest, whatever pose is shown.
+    mirrored : the other side of symmetry, for the few things a stroke does only once.
     """
 
     sight: Sight
@@ -86,7 +91,24 @@ class Ground:
     groom: Groom
     guides: Guides
     evaluator: Evaluator
-    seed: int
+    unit: str = "m"
+    at_rest: bool = False
+    mirrored: bool = False
+
+    @property
+    def seed(self) -> int:
+        """Of this stroke, for everything random in it."""
+        return self.groom.guides.next_id
+
+    @cached_property
+    def shown(self) -> Guides:
+        """The guides at press in the pose shown, for tools that work at rest too."""
+        return in_pose(self.guides, self.skin) if self.at_rest and self.skin is not self.rest else self.guides
+
+    @cached_property
+    def screen(self) -> Screen:
+        """Where the guides at press are on the screen (made at the first asking)."""
+        return Screen(self.view, self.shown)
 
     @property
     def field(self) -> DistanceField:
@@ -114,12 +136,19 @@ class Ground:
 
     def ray(self, pointer: Pointer) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Origin (3,) and unit direction (3,) in object space of the line of sight through a pointer."""
-        x = 2.0 * (pointer.x + 0.5) / self.view.width - 1.0
-        y = 1.0 - 2.0 * (pointer.y + 0.5) / self.view.height
-        ends = np.linalg.solve(self.view.clip_from_object, np.array([[x, y, -1.0, 1.0], [x, y, 1.0, 1.0]]).T).T
-        near, far = ends[:, :3] / ends[:, 3:]
+        origins, directions = self.rays(np.array([[pointer.x, pointer.y]]))
+        return origins[0], directions[0]
+
+    def rays(self, pixels: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origins (N, 3) and unit directions (N, 3) in object space of the lines of sight through pixels (N, 2)."""
+        x = 2.0 * (pixels[:, 0] + 0.5) / self.view.width - 1.0
+        y = 1.0 - 2.0 * (pixels[:, 1] + 0.5) / self.view.height
+        ones = np.ones_like(x)
+        ends = np.stack([np.stack([x, y, -ones, ones]), np.stack([x, y, ones, ones])])
+        near, far = (clip.T for clip in np.linalg.solve(self.view.clip_from_object, ends))
+        near, far = near[:, :3] / near[:, 3:], far[:, :3] / far[:, 3:]
         away = far - near
-        return near, away / max(float(np.linalg.norm(away)), 1e-300)
+        return near, away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
 
     def pixels_per_metre(self, point: NDArray[np.float64] | None = None) -> float:
         """Pixels a metre across the view covers at a point (3,) of the object; at the middle of the skin when None."""
@@ -148,21 +177,24 @@ class Stroke(Protocol):
         ...
 
 
-class BrushParams(Record):
-    """What every brush with a ring has."""
+@runtime_checkable
+class Picks(Protocol):
+    """A stroke that leaves something in the settings of its tool (a strand picked to be cloned).
 
-    size: Annotated[float, field(
-        "Size", "Radius of the ring, in pixels of the screen or along the skin.", "px", (8, 300), (1, 4000))] = 70.0
-    world: Annotated[bool, field(
-        "Size in world", "Keeps the ring the same size on the skin when you zoom; off keeps it in pixels.")] = False
-    strength: Annotated[float, field(
-        "Strength", "How much one pass of the brush does, from nothing at 0 to all at 1.", "", (0, 1), (0, 1))] = 0.6
-    falloff: Annotated[str, field(
-        "Falloff", "How the brush fades from the middle of its ring to the rim.", choices=SHAPES)] = "smooth"
-    pressure_size: Annotated[bool, field(
-        "Pen sizes", "Pressing the pen harder makes the ring larger, up to its full size.")] = False
-    pressure_strength: Annotated[bool, field(
-        "Pen strength", "Pressing the pen harder makes the brush stronger, up to its full strength.")] = True
+    picked : fields of the tool's params and their new values; looked at after the release, outside undo.
+    """
+
+    picked: dict[str, Any]
+
+
+class Turn(NamedTuple):
+    """What held keys or the eraser end of the pen turn a tool into: another tool (or the same), some settings changed.
+
+    A ring keeps its size through it.
+    """
+
+    tool: str
+    params: Mapping[str, Any] = MappingProxyType({})
 
 
 P = TypeVar("P", bound=Record)
@@ -176,7 +208,8 @@ class Tool(Generic[P]):
     tooltip : what it does and when, one teaching sentence. hint : what mouse and keys do now, for the status line.
     step : name of the undo step. edits : what it changes; of the other things it is spared what is not respected.
     at_rest : works on the animal at rest (planting), not in the pose shown.
-    with_shift, with_ctrl : names of the tools that held keys turn it into, or "".
+    with_shift, with_ctrl, with_eraser : what held keys or the eraser end of a pen turn it into, or None. Strokes never
+        look at these keys themselves.
     """
 
     name: ClassVar[str]
@@ -188,8 +221,9 @@ class Tool(Generic[P]):
     step: ClassVar[str]
     edits: ClassVar[Edits] = "shape"
     at_rest: ClassVar[bool] = False
-    with_shift: ClassVar[str] = ""
-    with_ctrl: ClassVar[str] = ""
+    with_shift: ClassVar[Turn | None] = None
+    with_ctrl: ClassVar[Turn | None] = None
+    with_eraser: ClassVar[Turn | None] = None
     Params: ClassVar[type[Record]]
 
     def __init__(self, params: P) -> None:
@@ -201,32 +235,7 @@ class Tool(Generic[P]):
 
     def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
         """What to draw over the picture at the pointer: the ring of brushes, nothing for others."""
-        return ring_overlays(self.params, ground, pointer) if isinstance(self.params, BrushParams) else ()
-
-
-WORLD_PIXELS = 1000.0  # a size in the world is given as pixels at this many pixels per diagonal of the skin
-
-
-def ring_radius(params: BrushParams, ground: Ground, pointer: Pointer) -> float:
-    """Radius of the ring in pixels at a pointer, the pen's pressure included."""
-    radius = params.size
-    if params.world:
-        hit = ground.hit(pointer)
-        metres = params.size / WORLD_PIXELS * ground.rest.diagonal
-        radius = metres * ground.pixels_per_metre(None if hit is None else hit.point)
-    return radius * (max(pointer.pressure, 0.05) if params.pressure_size else 1.0)
-
-
-def ring_strength(params: BrushParams, pointer: Pointer) -> float:
-    """Strength 0 .. 1 at a pointer, the pen's pressure included."""
-    return params.strength * (pointer.pressure if params.pressure_strength else 1.0)
-
-
-def ring_overlays(params: BrushParams, ground: Ground, pointer: Pointer) -> Overlays:
-    """The ring at the pointer, and within it where the brush has half its weight."""
-    radius = ring_radius(params, ground, pointer)
-    half = {"smooth": 0.5, "flat": 0.6, "linear": 0.5, "sharp": 0.3, "constant": 1.0}.get(params.falloff, 0.5)
-    return (Circle(pointer.x, pointer.y, radius), Circle(pointer.x, pointer.y, half * radius, "faint", 1.0))
+        return ring_overlays(self.params, ground, pointer) if isinstance(self.params, RingParams) else ()
 
 
 def nothing_to_do() -> UserError:

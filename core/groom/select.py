@@ -101,6 +101,13 @@ def select_islands(guides: Guides, mesh: Mesh) -> Guides:
     """Select everything on those connected pieces of the mesh where something is selected."""
     if not guides.selected.any():
         return guides
+    piece = pieces(mesh)
+    of_root = piece[root_vertices(mesh, guides.roots)[:, 0]]
+    return select(guides, np.isin(of_root, of_root[guides.selected]))
+
+
+def pieces(mesh: Mesh) -> NDArray[np.int32]:
+    """The connected piece of the mesh each vertex belongs to, (V,) int32, numbered from 0."""
     starts = mesh.starts
     after = np.arange(1, len(mesh.corners) + 1)
     after[starts + mesh.counts - 1] = starts  # the next corner around each face
@@ -108,6 +115,4 @@ def select_islands(guides: Guides, mesh: Mesh) -> Guides:
         (np.ones(len(mesh.corners), np.int8), (mesh.corners, mesh.corners[after])),
         shape=(len(mesh.points), len(mesh.points)),
     )
-    _, piece = connected_components(edges.tocsr(), directed=False)
-    of_root = piece[root_vertices(mesh, guides.roots)[:, 0]]
-    return select(guides, np.isin(of_root, of_root[guides.selected]))
+    return np.asarray(connected_components(edges.tocsr(), directed=False)[1], np.int32)

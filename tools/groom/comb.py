@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from core.falloff import SHAPES, Shape
 from core.field import field
 from core.groom.comb import comb
 from core.groom.guides import Guides
 from core.groom.region import facing
 from core.overlay import Overlays, Polyline
-from tools.tool import BrushParams, Ground, Pointer, Stroke, Tool, nothing_to_do, ring_radius, ring_strength
+from tools.brush import BrushStroke
+from tools.ring import BrushParams, ring_strength
+from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+
+FULL_TILT = math.radians(60.0)  # what pens report at the most
+STEEPEST = 1.3  # radians, what the kernel takes
 
 
 class CombParams(BrushParams):
     """Settings of the comb."""
 
+    falloff: Annotated[Shape, field(
+        "Falloff", "How the comb fades from the middle of its ring to the rim.", choices=SHAPES)] = "flat"
     grip: Annotated[float, field(
         "Grip", "How firmly hair follows the ring across its length; low lets it slip through.", "", (0, 1), (0, 1))
     ] = 0.85
@@ -29,8 +37,9 @@ class CombParams(BrushParams):
     lift: Annotated[float, field(
         "Lift off skin", "Angle at which combed hair stands off the skin, in degrees.", "rad", (0, 0.8), (0, 1.3))
     ] = 0.08
-    through: Annotated[bool, field(
-        "Far side too", "Combs hair on the far side of the animal as well as what you see.")] = False
+    tilt_lift: Annotated[float, field(
+        "Pen tilt lifts", "Angle that a pen laid flat adds to the lift; 0 ignores how you hold the pen.", "rad",
+        (0, 0.8), (0, 1.3))] = 0.0
 
 
 class Comb(Tool[CombParams]):
@@ -41,10 +50,11 @@ class Comb(Tool[CombParams]):
     icon = "comb"
     order = 30
     tooltip = "Combs hair along the stroke: it follows the ring sideways, slips along its length and lies down."
-    hint = "Drag: comb   Shift: smooth   Ctrl: length"
+    hint = "Drag: comb   Shift: smooth   Ctrl: length   Eraser: smooth"
     step = "Comb"
-    with_shift = "smooth"
-    with_ctrl = "length"
+    with_shift = Turn("smooth")
+    with_ctrl = Turn("length")
+    with_eraser = Turn("smooth")
     Params = CombParams
 
     def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
@@ -54,30 +64,25 @@ class Comb(Tool[CombParams]):
         return CombStroke(self.params, ground)
 
 
-class CombStroke:
+class CombStroke(BrushStroke[CombParams]):
     """Combs along the way since the last batch."""
 
     def __init__(self, params: CombParams, ground: Ground) -> None:
-        self.params, self.ground = params, ground
-        self.last: Pointer | None = None
-        self.way: NDArray[np.float64] = np.empty((0, 2))
+        super().__init__(params, ground)
         # the side that is seen is settled at press: hair must not drop out of a stroke as it turns
         self.mask = None if params.through else facing(ground.guides, ground.view)
 
-    def extend(self, guides: Guides, pointers: tuple[Pointer, ...]) -> Guides:
-        """Guides combed along these samples."""
-        way = np.array([(p.x, p.y) for p in ((self.last, *pointers) if self.last else pointers) if p is not None])
-        self.last, self.way = pointers[-1], way
-        p, last = self.params, pointers[-1]
+    def brush(self, guides: Guides) -> Guides:
+        """Guides combed along the way."""
+        p, last = self.params, self.last
+        assert last is not None
+        tilt = min(math.hypot(last.tilt_x, last.tilt_y) / FULL_TILT, 1.0)
         return comb(
-            guides, self.ground.view, way, ring_radius(p, self.ground, last), field=self.ground.field,
-            strength=ring_strength(p, last), grip=p.grip, lay=p.lay, tip_first=p.tip_first, lift=p.lift, mask=self.mask,
+            guides, self.ground.view, self.way, self.radius, field=self.ground.field, strength=ring_strength(p, last),
+            grip=p.grip, lay=p.lay, shape=p.falloff, tip_first=p.tip_first,
+            lift=min(p.lift + tilt * p.tilt_lift, STEEPEST), mask=self.mask,
             ranges=self.ground.evaluator.workers.ranges,
         )
-
-    def finish(self, guides: Guides) -> Guides:
-        """Nothing more is done at release."""
-        return guides
 
     def overlays(self) -> Overlays:
         """The direction of pull."""
@@ -87,5 +92,4 @@ class CombStroke:
         size = float(np.linalg.norm(pull))
         if size < 1e-6:
             return ()
-        ring = ring_radius(self.params, self.ground, self.last) if self.last else 0.0
-        return (Polyline(np.stack([self.way[-1], self.way[-1] + pull / size * ring]), "accent", 2.0),)
+        return (Polyline(np.stack([self.way[-1], self.way[-1] + pull / size * self.radius]), "accent", 2.0),)

@@ -1,0 +1,44 @@
+"""Wash: takes hairspray out of the hair under the ring."""
+
+from __future__ import annotations
+
+from core.groom.guides import Guides
+from core.groom.hairspray import wash
+from tools.brush import BrushStroke, on_rows
+from tools.ring import BrushParams
+from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+
+
+class WashParams(BrushParams):
+    """Settings of Wash."""
+
+
+class Wash(Tool[WashParams]):
+    """Frees hair."""
+
+    name = "wash"
+    label = "Wash"
+    icon = "wash"
+    order = 51
+    tooltip = "Washes hairspray out of the hair under the ring, so that tools move it again."
+    hint = "Drag: wash   Ctrl: spray"
+    step = "Wash"
+    edits = "hold"
+    with_ctrl = Turn("hairspray")
+    Params = WashParams
+
+    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+        """A stroke that washes."""
+        if len(ground.guides) == 0:
+            raise nothing_to_do()
+        return WashStroke(self.params, ground)
+
+
+class WashStroke(BrushStroke[WashParams]):
+    """Takes hold away along the way."""
+
+    def brush(self, guides: Guides) -> Guides:
+        """Guides washed under the ring."""
+        rows, reach = self.under(guides)
+        amount = self.dose
+        return on_rows(guides, rows, lambda g: wash(g, amount, reach))
