@@ -1,0 +1,165 @@
+"""The picture of what lies on the desk: follows the session, draws while things move, finishes at rest.
+
+Knows no events and no timers: the viewport calls :meth:`LivePicture.paint` for a frame and, while nothing moves,
+:meth:`LivePicture.rest` for one short slice of finishing after another, always with its OpenGL context current.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import moderngl
+
+from core.camera import Camera
+from core.errors import UserError
+from core.overlay import Overlay
+from tools.session import Session
+from viewport.density import DensityController
+from viewport.hud import TextImage
+from viewport.live_scene import Change, Done, Job, LiveScene
+from viewport.scene import Scene
+from viewport.view import HudLine, View3D
+
+StartJob = Callable[[Job, Callable[[Done], None], Callable[[Exception], None]], None]
+"""Runs a job on another thread; calls back on this one with its result or with what went wrong."""
+
+CATCH_UP = 0.012  # seconds of a slice
+
+
+class LivePicture:
+    """The moving and the finished picture of one session.
+
+    density : how many hairs are drawn while things move. shown : hairs in the last moving picture; total : in the
+    scene. troubles : what cannot be shown as the document says, in sentences.
+    """
+
+    def __init__(
+        self, ctx: moderngl.Context, session: Session, text: TextImage, start_job: StartJob,
+        adopted: Callable[[], None], budget_ms: float,
+    ) -> None:
+        self.view = View3D(ctx, text=text)
+        self.density = DensityController(budget_ms=budget_ms)
+        self.shown = self.total = 0
+        self.troubles: tuple[str, ...] = ()
+        self._start_job, self._adopted = start_job, adopted
+        self._refining: Iterator[float] | None = None
+        self._finished = False
+        self._scene = Scene()
+        self._size = (1, 1)
+        self._jobs = 0
+        self.session = session
+        self.live = LiveScene(session.evaluator)
+
+    def replace_session(self, session: Session) -> None:
+        """Show another session from now on; what jobs still bring for the old one is dropped."""
+        self.session, self.live = session, LiveScene(session.evaluator)
+        self._jobs = 0
+        self._finished = False
+
+    @property
+    def settled(self) -> bool:
+        """True when the picture shows everything, finished, and no job is out that would change it."""
+        return self._finished and not self._jobs
+
+    @property
+    def growing(self) -> bool:
+        """True while a job is out that will change the picture."""
+        return self._jobs > 0
+
+    def follow(self, camera: Camera, size: tuple[int, int], moving: bool) -> bool:
+        """Take the session as it is now; True when the picture must be drawn anew.
+
+        moving : a hand or the timeline moves things, so nothing slow is begun.
+        """
+        workspace = self.session.workspace
+        self._size = size
+        change = self.live.update(
+            self.session.document, workspace.frame, workspace.view, moving, self.density.drawn, workspace.groom)
+        changed = self._take(change, camera)
+        if not moving:
+            self._ask()
+        return changed
+
+    def draw(self) -> None:
+        """Draw the moving picture."""
+        self.shown = self.view.draw_interactive(self.density.drawn)
+        self._refining, self._finished = None, False
+
+    def present(
+        self, framebuffer: moderngl.Framebuffer, overlays: Sequence[Overlay], hud: Sequence[HudLine], ratio: float
+    ) -> None:
+        """Bring the best picture there is, with marks and words over it, to the screen."""
+        self.view.present(framebuffer, self._size, overlays, hud, ratio)
+
+    def rest(self, camera: Camera) -> bool:
+        """One short slice of what is still to be done; False when there is nothing more."""
+        change = self.live.catch_up(CATCH_UP)
+        if change is not None:
+            self._take(change, camera)
+            self._refining, self._finished = None, False
+            return True
+        if self._finished:
+            return False
+        self._ask()
+        if self._refining is None:
+            self._refining = self.view.refine()
+        if next(self._refining, None) is None:
+            self._refining, self._finished = None, True
+        return not self._finished
+
+    def release(self) -> None:
+        """Give everything on the graphics card back."""
+        self.view.release()
+
+    def _take(self, change: Change, camera: Camera) -> bool:
+        self._scene, self.troubles = change.scene, change.troubles
+        self.total = sum(len(c.ids if c.order is None else c.order) for c in change.scene.coats)
+        self.density.limit(max((len(c.ids if c.order is None else c.order) for c in change.scene.coats), default=0))
+        changed = self.view.begin(change.scene, camera, self._size, self.session.workspace.view)
+        for points, rows in change.rows:
+            self.view.rows_changed(points, rows)
+        if changed or change.rows:
+            self._refining, self._finished = None, False
+        return changed or bool(change.rows)
+
+    def _ask(self) -> None:
+        live = self.live
+        for job in live.wanted_jobs():
+            self._jobs += 1
+            self._start_job(
+                job, lambda done, live=live: self._adopt(live, done),
+                lambda error, live=live, job=job: self._abandon(live, job, error))
+
+    def _adopt(self, live: LiveScene, done: Done) -> None:
+        if live is self.live:
+            self._jobs -= 1
+            live.adopt(done)
+            self._adopted()
+
+    def _abandon(self, live: LiveScene, job: Job, error: Exception) -> None:
+        if live is self.live:
+            self._jobs -= 1
+            live.abandon(job, error if isinstance(error, UserError) else UserError(str(error) or "it was cancelled"))
+            self._adopted()
+
+
+class Stopwatch:
+    """The usual time of the last few pieces of work, in milliseconds."""
+
+    def __init__(self) -> None:
+        self.ms = 0.0
+        self._start: float | None = None
+
+    def start(self) -> None:
+        """The work begins."""
+        self._start = time.perf_counter()
+
+    def stop(self) -> float | None:
+        """The work is done: its milliseconds, None when it had not begun."""
+        if self._start is None:
+            return None
+        took = 1e3 * (time.perf_counter() - self._start)
+        self._start = None
+        self.ms = took if self.ms == 0.0 else 0.7 * self.ms + 0.3 * took
+        return took

@@ -1,0 +1,363 @@
+"""The main window: puts the pieces in their places and gives commands what they ask for. Decides nothing else."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QByteArray, Qt
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QDockWidget,
+    QHBoxLayout,
+    QMainWindow,
+    QSplitter,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.window import keymap as keymaps
+from app.window.all_commands import all_commands
+from app.window.commands import Commands
+from app.window.console import Console
+from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
+from app.window.desk import Desk
+from app.window.file_actions import FileActions
+from app.window.history_panel import HistoryPanel
+from app.window.hotkeys import Hotkeys
+from app.window.keymap_editor import KeymapEditor
+from app.window.palette import Palette
+from app.window.preferences import Preferences
+from app.window.sections import Column, FoldMemory, Section
+from app.window.settings import Settings, save_settings
+from app.window.shelf import Shelf
+from app.window.status_line import StatusLine
+from app.window.theme import apply, load_theme, look_of
+from app.window.timeline import Timeline
+from app.window.top_bar import TopBar
+from app.window.view_host import ViewHost
+from app.window.viewport_widget import Viewport
+from app.window.window_commands import PANELS
+from core.camera import Camera
+from core.document import Document
+from core.errors import UserError
+from core.workspace import Workspace
+from tools.session import Session
+
+USUAL_SIZE = (1600, 1000)
+COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
+
+
+class MainWindow(QMainWindow):
+    """The window. Implements what :class:`app.window.commands.Window` asks for.
+
+    Parameters
+    ----------
+    settings : the preferences to begin with. folder : where preferences are kept; None for the usual one.
+    """
+
+    def __init__(self, session: Session, settings: Settings, folder: Path | None = None) -> None:
+        super().__init__()
+        self._settings, self._folder = settings, folder
+        self.desk = Desk(session, self)
+        self.commands = Commands(self)
+        self.commands.add(all_commands(session.tools))
+        loaded = keymaps.load(settings.keymap, folder)
+        self.hotkeys = Hotkeys(self, self.commands, loaded.keymap)
+        self.files = FileActions(self)
+        self._use_pen()
+        self.viewport = Viewport(self.desk, self.hotkeys, self.commands, self, settings.density_ms)
+        self.top = TopBar(self.desk, self.commands, self.hotkeys)
+        self.shelf = Shelf(self.desk, lambda tool: self.hotkeys.keymap.shown(f"tool.{tool}"))
+        self.view = ViewHost(self.viewport, self)
+        self.middle = QStackedWidget()
+        self.status = StatusLine(self.desk, self.hotkeys)
+        self.timeline = Timeline(self.desk)
+        self.panels: dict[str, QWidget] = {"shelf": self.shelf, "timeline": self.timeline}
+        self.column = self._make_column()
+        self._console: QDockWidget | None = None
+        self._preferences: Preferences | None = None
+        self._lay_out()
+        self.setAcceptDrops(True)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.desk.session_replaced.connect(self._session_replaced)
+        self.desk.changed.connect(self._document_changed)
+        self.desk.workspace_changed.connect(self._workspace_changed)
+        self.timeline.playback.changed.connect(self._playback_changed)
+        self.viewport.failed.connect(self.view.show_trouble)
+        self.viewport.settled.connect(self._show_cached)
+        for trouble in (loaded.trouble, *(f"{t.file}: {t.reason}" for t in session.tools.troubles)):
+            if trouble:
+                self.desk.error(UserError(trouble))
+        self._show_panels()
+        self._show_title()
+        self._show_middle()
+
+    # -- how it is put together --------------------------------------------------------------------------
+
+    def _make_column(self) -> Column:
+        memory, column = FoldMemory(self._folder), Column()
+        made: tuple[tuple[str, QWidget], ...] = (
+            ("tool", ToolPanel(self.desk, memory)),
+            ("respect", RespectPanel(self.desk, memory)),
+            ("coat", CoatPanel(self.desk, memory)),
+            ("history", Section(PANELS["history"][0], HistoryPanel(self.desk), memory, "history")),
+        )
+        for name, panel in made:
+            column.add(panel)
+            self.panels[name] = panel
+        return column
+
+    def _lay_out(self) -> None:
+        self.split = QSplitter(Qt.Orientation.Horizontal)
+        self.split.setChildrenCollapsible(False)
+        self.middle.addWidget(self.view)
+        self.split.addWidget(self.middle)
+        self.split.addWidget(self.column)
+        self.split.setStretchFactor(0, 1)
+        self.split.setStretchFactor(1, 0)
+        self.split.setHandleWidth(look_of().grid)
+        across = QHBoxLayout()
+        across.setSpacing(0)
+        across.addWidget(self.shelf)
+        across.addWidget(self.split, 1)
+        whole = QWidget()
+        down = QVBoxLayout(whole)
+        down.setContentsMargins(0, 0, 0, 0)
+        down.setSpacing(0)
+        down.addWidget(self.top)
+        down.addLayout(across, 1)
+        down.addWidget(self.timeline)
+        down.addWidget(self.status)
+        self.setCentralWidget(whole)
+        self.resize(*USUAL_SIZE)
+        self._usual_split()
+        self._restore(self._settings)
+
+    def _usual_split(self) -> None:
+        wide = COLUMN_WIDTH * look_of().text
+        self.split.setSizes([max(self.width() - wide - self.shelf.sizeHint().width(), 100), wide])
+
+    def _restore(self, settings: Settings) -> None:
+        if settings.geometry:
+            self.restoreGeometry(QByteArray(base64.b64decode(settings.geometry)))
+        if settings.panels:
+            self.split.restoreState(QByteArray(base64.b64decode(settings.panels)))
+
+    # -- what commands ask for ---------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        """The preferences now."""
+        return self._settings
+
+    @property
+    def playing(self) -> bool:
+        """True during playback."""
+        return self.timeline.playback.playing
+
+    def look(self, camera: Camera) -> None:
+        """Look through a camera."""
+        self.viewport.eye.look(camera)
+
+    def look_from(self, side: str) -> None:
+        """Turn to a side of the animal."""
+        self.viewport.eye.look_from(side)
+
+    def frame_all(self) -> None:
+        """See everything."""
+        self.viewport.eye.frame_all()
+
+    def frame_selected(self) -> None:
+        """See the selected guides."""
+        self.viewport.eye.frame_selected()
+
+    def toggle_projection(self) -> None:
+        """A lens or parallel rays."""
+        self.viewport.eye.toggle_projection()
+
+    def scale_density(self, factor: float) -> None:
+        """More or fewer hairs while the hand moves."""
+        self.viewport.scale_density(factor)
+
+    def toggle_playback(self) -> None:
+        """Play or stop."""
+        self.timeline.playback.toggle()
+
+    def toggle_panel(self, name: str) -> None:
+        """Show or hide a panel."""
+        panels = self._visible_panels()
+        wanted = tuple(p for p in panels if p != name) if name in panels else (*panels, name)
+        self.desk.set_workspace(panels=wanted)
+
+    def reset_layout(self) -> None:
+        """Every panel where it was at first."""
+        self.desk.set_workspace(panels=tuple(PANELS))
+        self.view.dock()
+        self._usual_split()
+
+    def toggle_full_screen(self) -> None:
+        """Fill the screen, or not."""
+        if self.isFullScreen():
+            self.showNormal()
+        else:
+            self.showFullScreen()
+
+    def show_palette(self) -> None:
+        """Find a command by words."""
+        Palette(self, self.commands, self.hotkeys.keymap).open_over(self)
+
+    def show_preferences(self) -> None:
+        """The preferences beside the window."""
+        if self._preferences is None:
+            self._preferences = Preferences(self, self)
+            self._preferences.destroyed.connect(self._preferences_gone)
+        self._preferences.show()
+        self._preferences.raise_()
+        self._preferences.activateWindow()
+
+    def show_keymap_editor(self) -> None:
+        """The hotkeys beside the window."""
+        editor = KeymapEditor(self, self.commands, self.hotkeys.keymap, self._settings.keymap, self._folder)
+        editor.changed.connect(self._keymap_changed)
+        editor.preset_chosen.connect(lambda name: self.change_settings(keymap=name))
+        editor.failed.connect(self.desk.error)
+        editor.show()
+
+    def show_console(self) -> None:
+        """Python at the bottom of the window, or away with it."""
+        if self._console is None:
+            self._console = QDockWidget("Python", self)
+            self._console.setObjectName("console")
+            self._console.setWidget(Console(self.desk))
+            self.addDockWidget(Qt.DockWidgetArea.BottomDockWidgetArea, self._console)
+            return
+        self._console.setVisible(not self._console.isVisible())
+
+    def change_settings(self, **changes: Any) -> None:
+        """Take other preferences at once, and keep them."""
+        old, self._settings = self._settings, self._settings.replace(**changes)
+        new = self._settings
+        self.desk.attempt(save_settings, new, self._folder)
+        if (old.theme, old.text_size) != (new.theme, new.text_size):
+            application = QApplication.instance()
+            assert isinstance(application, QApplication)
+            apply(application, load_theme(new.theme), new.text_size)
+            self._take_look()
+        if old.keymap != new.keymap:
+            self._keymap_changed(keymaps.load(new.keymap, self._folder).keymap)
+        if old.unit != new.unit:
+            self._show_unit()
+        self.desk.session.history.budget = new.history_mb << 20
+        self.viewport.set_budget(new.density_ms)
+        self._use_pen()
+        if self._preferences is not None:
+            self._preferences.refresh()
+
+    def __getattr__(self, name: str) -> Any:
+        # files are a piece of their own, which commands need not know
+        if name in FileActions.COMMANDS:
+            return getattr(self.files, name)
+        raise AttributeError(name)
+
+    # -- what changes ------------------------------------------------------------------------------------
+
+    def _visible_panels(self) -> tuple[str, ...]:
+        return self.desk.workspace.panels or tuple(PANELS)
+
+    def _show_panels(self) -> None:
+        visible = self._visible_panels()
+        if self.desk.workspace.panels != visible:
+            self.desk.session.set_workspace(panels=visible)
+        for name, panel in self.panels.items():
+            panel.setVisible(name in visible)
+        self.column.setVisible(any(name in visible for name in self.panels if name not in ("shelf", "timeline")))
+
+    def _show_title(self) -> None:
+        session = self.desk.session
+        name = session.path.name if session.path is not None else "New"
+        self.setWindowTitle(f"{name}[*] – filoplume")
+        self.setWindowModified(not session.saved)
+
+    def _show_middle(self) -> None:
+        self.status.show_hint()
+
+    def _show_unit(self) -> None:
+        for panel in self.panels.values():
+            if isinstance(panel, ToolPanel | RespectPanel | CoatPanel):
+                panel.set_unit(self._settings.unit)
+
+    def _show_cached(self) -> None:
+        if self.viewport.picture is not None:
+            self.timeline.set_cached(self.viewport.picture.live.cached_frames(self.desk.document))
+
+    def _session_replaced(self) -> None:
+        self._use_pen()
+        self.desk.session.history.budget = self._settings.history_mb << 20
+        self._show_panels()
+        self._show_title()
+        self._show_middle()
+
+    def _document_changed(self, old: Document, new: Document) -> None:
+        if self.desk.session.stroking:
+            return
+        self._show_title()
+        if bool(old.meshes) != bool(new.meshes):
+            self._show_middle()
+
+    def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
+        if old.panels != new.panels:
+            self._show_panels()
+
+    def _playback_changed(self) -> None:
+        self.viewport.playing = self.playing
+        self.viewport.redraw()
+
+    def _keymap_changed(self, keymap: keymaps.Keymap) -> None:
+        self.hotkeys.set_keymap(keymap)
+        self.shelf.rebuild()
+        self.status.show_hint()
+        self.top.update()
+
+    def _take_look(self) -> None:
+        self.top.take_look()
+        self.hotkeys.take_look()
+        self.status.show_hint()
+        self.viewport.update()
+
+    def _preferences_gone(self) -> None:
+        self._preferences = None
+
+    def _use_pen(self) -> None:
+        self.desk.session.hand.pen = self._settings.pen
+
+    # -- events ------------------------------------------------------------------------------------------
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Files may be dropped."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """A project or a mesh is opened, an image is pinned to the view."""
+        self.files.drop([Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()])
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Nothing is asked: what is not saved is in the journal and offered at the next start."""
+        self.timeline.playback.pause()
+        self.desk.end_stroke()
+        self.view.dock()
+        self.change_settings(
+            geometry=_text(self.saveGeometry()), panels=_text(self.split.saveState()))
+        self.desk.jobs.close()
+        self.viewport.release_gl()
+        self.desk.session.changed = None
+        self.desk.session.close()
+        event.accept()
+
+
+def _text(data: QByteArray) -> str:
+    return base64.b64encode(data.data()).decode()

@@ -1,0 +1,213 @@
+"""How the artist looks: the camera of the desk, the point its moves are about, and what gestures do to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.deliver import turned_view
+from app.window.desk import Desk
+from app.window.keymap import Navigation
+from core import navigate
+from core.camera import Camera, frame_points, ray_through
+from core.mesh.bvh import cast_rays
+from core.mesh.surface import strands_on_deformed
+from core.posed import skin_at
+from tools.scene import active_mesh
+
+Array = NDArray[np.float64]
+
+TURN = 0.0075  # radians for a pixel of Qt's
+PULL = 0.006  # of a dolly, in powers of e for a pixel
+NOTCH = 0.86  # of the distance is left after a notch of the wheel
+LENS = 0.5  # radians, the vertical field of view to begin with
+
+
+class Eye:
+    """The camera of a desk.
+
+    Parameters
+    ----------
+    size : of the picture in pixels of the framebuffer. ratio : of these to pixels of Qt.
+    """
+
+    def __init__(self, desk: Desk, size: Callable[[], tuple[int, int]], ratio: Callable[[], float]) -> None:
+        self.desk, self.size, self.ratio = desk, size, ratio
+        self._pivot: Array | None = None
+        self._corners: tuple[object, Array] | None = None
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the workspace; one that sees everything when it has none."""
+        cameras = self.desk.workspace.cameras
+        return cameras[0] if cameras else self.first_camera()
+
+    def first_camera(self) -> Camera:
+        """A three-quarter view of everything, from the front of the animal."""
+        return self._framed(self._direction("three-quarter"))
+
+    def look(self, camera: Camera) -> None:
+        """Look through a camera; near and far are put about what there is."""
+        clipped = navigate.with_clipping(camera, self.corners())
+        self.desk.set_workspace(cameras=(clipped, *self.desk.workspace.cameras[1:]))
+
+    def look_from(self, side: str) -> None:
+        """Turn to one of the sides of the animal, about what was looked at."""
+        pivot = self.pivot
+        self.look(navigate.turned_to(self.camera, pivot, self._direction(side)))
+
+    def frame_all(self) -> None:
+        """Come so near or far that everything just fits."""
+        self._pivot = None
+        self.look(navigate.frame(self.camera, self.points(), self._aspect()))
+
+    def frame_selected(self) -> None:
+        """The same for the selected guides; everything when none are."""
+        groom = self.desk.groom
+        if groom is None or not groom.guides.selected.any():
+            self.frame_all()
+            return
+        item = next(m for m in self.desk.document.meshes if m.id == groom.mesh_id)
+        skin = skin_at(item, self.desk.workspace.frame, self.desk.session.evaluator)
+        guides = groom.guides
+        posed = strands_on_deformed(item.mesh, guides.roots, guides.points, skin.points, skin.normals)
+        points = posed[guides.selected].reshape(-1, 3).astype(np.float64)
+        self._pivot = points.mean(axis=0)
+        self.look(navigate.frame(self.camera, points, self._aspect()))
+
+    def toggle_projection(self) -> None:
+        """A lens or parallel rays; what is looked at keeps its size."""
+        self.look(navigate.with_projection(self.camera, self.pivot, not self.camera.orthographic))
+
+    def pinch(self, x: float, y: float, factor: float) -> None:
+        """Come nearer to what is under the cursor: `factor` times the distance is left."""
+        self.look(navigate.dolly(self.camera, self.take_pivot(x, y), factor))
+
+    def wheel(self, action: Navigation, notches: float, x: float, y: float) -> None:
+        """What the wheel does to the view."""
+        factor = NOTCH**notches
+        if action == "zoom":
+            self.look(navigate.zoom(self.camera, factor))
+        else:
+            self.pinch(x, y, factor)
+
+    @property
+    def pivot(self) -> Array:
+        """The point of the last move, else the middle of everything (the middle of the view when that is behind)."""
+        camera = self.camera
+        for point in (self._pivot, self.corners().mean(axis=0)):
+            if point is not None and navigate.depth_of(camera, point) > camera.near:
+                return point
+        return camera.position + max(2.0 * camera.near, 1.0) * camera.forward
+
+    def take_pivot(self, x: float, y: float) -> Array:
+        """Make what lies under a pixel the pivot, when there is skin; otherwise it stays as it was."""
+        found = self.under(x, y)
+        if found is not None:
+            self._pivot = found
+        return self.pivot
+
+    def under(self, x: float, y: float) -> Array | None:
+        """The point (3,) of the skin shown that is under a pixel, or None."""
+        width, height = self.size()
+        ray = ray_through(self.camera, (x, y), width, height)
+        nearest, frame, view = math.inf, self.desk.workspace.frame, self.desk.workspace.view
+        for item in self.desk.document.meshes:
+            if not item.hidden and (not view.isolated or item.id in view.isolated):
+                skin = skin_at(item, frame, self.desk.session.evaluator)
+                found, _, _ = cast_rays(
+                    skin.bvh, ray.origin[None].astype(np.float32), ray.direction[None].astype(np.float32))
+                nearest = min(nearest, float(found[0]))
+        return ray.origin + nearest * ray.direction if math.isfinite(nearest) else None
+
+    def points(self) -> Array:
+        """Points (N, 3) of everything shown: skin in the pose of the frame, and the room its guides need."""
+        document, workspace = self.desk.document, self.desk.workspace
+        clouds: list[Array] = []
+        for item in document.meshes:
+            if item.hidden or (workspace.view.isolated and item.id not in workspace.view.isolated):
+                continue
+            skin = skin_at(item, workspace.frame, self.desk.session.evaluator)
+            points = skin.points[np.unique(item.mesh.corners)]
+            clouds.append(points)
+            length = max((_longest(g.guides.points) for g in document.grooms if g.mesh_id == item.id), default=0.0)
+            if length:
+                clouds += [points + length * axis for axis in (*np.eye(3), *-np.eye(3))]
+        return np.concatenate(clouds).astype(np.float64) if clouds else np.zeros((0, 3))
+
+    def corners(self) -> Array:
+        """(8, 3) the corners of a box about all meshes at rest and a quarter more; of a cube when there are none."""
+        meshes = self.desk.document.meshes
+        if self._corners is None or self._corners[0] is not meshes:
+            ends = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
+            used = [m.mesh.points for m in meshes if len(m.mesh.points)]
+            if used:
+                low = np.min([p.min(axis=0) for p in used], axis=0).astype(np.float64)
+                high = np.max([p.max(axis=0) for p in used], axis=0).astype(np.float64)
+                more = 0.25 * float(np.linalg.norm(high - low))
+                ends = np.stack([low - more, high + more])
+            self._corners = meshes, np.array([
+                (ends[i, 0], ends[j, 1], ends[k, 2]) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        return self._corners[1]
+
+    def _aspect(self) -> float:
+        width, height = self.size()
+        return width / height
+
+    def _direction(self, side: str) -> tuple[float, float, float]:
+        document, view = self.desk.document, navigate.SIDES[side]
+        item = active_mesh(document, self.desk.workspace)
+        return view if item is None else turned_view(view, skin_at(item, None, self.desk.session.evaluator))
+
+    def _framed(self, direction: tuple[float, float, float]) -> Camera:
+        camera = frame_points(self.points(), direction, self._aspect(), field_of_view=LENS)
+        return navigate.with_clipping(camera, self.corners())
+
+
+class CameraDrag:
+    """A gesture that moves the camera from press to release."""
+
+    def __init__(self, eye: Eye, action: Navigation, x: float, y: float) -> None:
+        self._eye, self._action = eye, action
+        self._before = eye.camera
+        self._pivot = eye.take_pivot(x, y)
+        self._last = self._next = (x, y)
+
+    def move(self, x: float, y: float) -> None:
+        """The hand is there now; the camera follows with the next picture."""
+        self._next = (x, y)
+
+    def frame(self) -> None:
+        """Follow all that moved since the last picture."""
+        if self._next == self._last:
+            return
+        across, down = self._next[0] - self._last[0], self._next[1] - self._last[1]
+        self._last = self._next
+        camera, ratio = self._eye.camera, self._eye.ratio()
+        if self._action == "orbit":
+            camera = navigate.orbit(camera, self._pivot, -TURN * across / ratio, TURN * down / ratio)
+        elif self._action == "pan":
+            camera = navigate.pan(camera, self._pivot, across, down, self._eye.size()[1])
+        elif self._action == "dolly":
+            camera = navigate.dolly(camera, self._pivot, math.exp(PULL * (down - across) / ratio))
+        else:
+            camera = navigate.zoom(camera, math.exp(PULL * (down - across) / ratio))
+        self._eye.look(camera)
+
+    def end(self) -> None:
+        """The button is released."""
+        self.frame()
+
+    def cancel(self) -> None:
+        """Look as before the press."""
+        self._eye.look(self._before)
+
+
+def _longest(points: np.ndarray) -> float:
+    """Length of the longest guide, points (N, P, 3)."""
+    if not len(points):
+        return 0.0
+    return float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1).max())

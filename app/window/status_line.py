@@ -1,0 +1,104 @@
+"""The last line of the window: what mouse and keys do now, what was said, what goes on."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+
+from app.window.desk import Desk
+from app.window.hotkeys import Hotkeys
+from app.window.jobs import JobsBar
+from app.window.keymap import Keymap
+from app.window.theme import look_of
+from core.workspace import Workspace
+
+SAID_MS = 6000  # how long something said stays, before the hint comes back
+FAILED_MS = 20000
+ACTIONS = (("orbit", "turn"), ("pan", "slide"), ("dolly", "nearer"))
+WORDS = {"LMB": "Left button", "MMB": "Middle button", "RMB": "Right button", "Wheel": "Wheel"}
+
+
+class StatusLine(QWidget):
+    """Hint or news at the left, jobs at the right; an error can be copied with its details."""
+
+    def __init__(self, desk: Desk, hotkeys: Hotkeys, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk, self._hotkeys = desk, hotkeys
+        self.words = QLabel()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)
+        self.words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.copy = QPushButton("Copy details")
+        self.copy.setToolTip("Copies the whole message, to send it to whoever looks after the program.")
+        self.copy.clicked.connect(self._copy)
+        self.copy.hide()
+        self._details = ""
+        self._until = QTimer(self, singleShot=True)
+        self._until.timeout.connect(self.show_hint)
+        line = QHBoxLayout(self)
+        line.setContentsMargins(12, 0, 12, 4)
+        line.setSpacing(8)
+        line.addWidget(self.words, 1)
+        line.addWidget(self.copy)
+        line.addWidget(JobsBar(desk, self))
+        desk.said.connect(self.say)
+        desk.failed.connect(self.fail)
+        desk.workspace_changed.connect(self._workspace_changed)
+        desk.session_replaced.connect(self.show_hint)
+        self.show_hint()
+
+    def say(self, sentence: str) -> None:
+        """Show a sentence for a while."""
+        self._show(sentence, "text", SAID_MS)
+
+    def fail(self, sentence: str, details: str) -> None:
+        """Show what went wrong, long enough to be read."""
+        self._details = f"{sentence}\n\n{details}" if details else ""
+        self._show(sentence, "trouble_text", FAILED_MS)
+        self.copy.setVisible(bool(details))
+
+    def show_hint(self) -> None:
+        """Say what mouse and keys do now."""
+        self._until.stop()
+        self.copy.hide()
+        self._paint("dim")
+        self.words.setText(hint(self._desk, self._hotkeys.keymap))
+
+    def _show(self, sentence: str, colour: str, milliseconds: int) -> None:
+        self.copy.hide()
+        self._paint(colour)
+        self.words.setText(sentence)
+        self._until.start(milliseconds)
+
+    def _paint(self, colour: str) -> None:
+        palette = self.words.palette()
+        palette.setColor(self.words.foregroundRole(), look_of().theme.colour(colour))
+        self.words.setPalette(palette)
+
+    def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
+        if old.tool != new.tool:
+            self.show_hint()
+
+    def _copy(self) -> None:
+        QGuiApplication.clipboard().setText(self._details)
+
+
+def hint(desk: Desk, keymap: Keymap) -> str:
+    """What mouse and keys do now, in one line."""
+    if not desk.document.meshes:
+        return "Open a mesh or a project, or drop a file here."
+    parts = [desk.session.tool.hint] if desk.document.grooms else []
+    parts += [f"{_written(keys)}: {words}" for brush, words in (("size", "size"), ("strength", "strength"))
+              if (keys := keymap.brush.get(brush))]  # type: ignore[call-overload] # these are names of the record
+    parts += [f"{_written(keys)}: {words}" for action, words in ACTIONS
+              if (keys := keymap.navigate.get(action))]  # type: ignore[call-overload]
+    if radial := keymap.brush.get("radial"):
+        parts.append(f"{_written(radial)}: menu")
+    return "   ".join(parts)
+
+
+def _written(keys: tuple[str, ...]) -> str:
+    first = keys[0]
+    for name, words in WORDS.items():
+        first = first.replace(name, words)
+    return first

@@ -1,0 +1,482 @@
+"""The viewport: a native window with a picture in it, inside the main window.
+
+A ``QOpenGLWindow`` in ``createWindowContainer`` costs a tenth of a ``QOpenGLWidget`` and keeps its context when it is
+docked elsewhere. Its price: no widget can lie over it, so ring, words and figures are drawn in GL. Its framebuffer is
+number 0, whose size moderngl does not know: sizes are those of the window times ``devicePixelRatio``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QColor,
+    QCursor,
+    QExposeEvent,
+    QFocusEvent,
+    QGuiApplication,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QNativeGestureEvent,
+    QPainter,
+    QResizeEvent,
+    QSurfaceFormat,
+    QTabletEvent,
+    QWheelEvent,
+)
+from PySide6.QtOpenGL import QOpenGLWindow
+from PySide6.QtWidgets import QWidget
+
+from app.window.commands import Commands
+from app.window.desk import Desk
+from app.window.gestures import BrushDrag, Gestures
+from app.window.hotkeys import Hotkeys
+from app.window.live_picture import LivePicture, Stopwatch
+from app.window.navigation import CameraDrag, Eye
+from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
+from app.window.theme import look_of, text_font
+from core.document import Document
+from core.errors import UserError
+from core.overlay import Overlays
+from core.workspace import Workspace
+from tools.tool import Pointer, Sight
+from viewport.hud import Byte3
+from viewport.live_scene import Done, Job
+from viewport.view import HudLine
+
+NO_GL = "The view needs OpenGL 3.3, and this computer offers {found}. Install or update its graphics driver."
+CALM_MS = 120  # after the last movement, before the picture is finished
+HUD_EVERY = 0.25  # seconds between new figures in the corner
+
+
+class Viewport(QOpenGLWindow):
+    """The picture of a desk and the hand on it.
+
+    painted : a picture is on the screen. settled : nothing is left to do. failed : there is no OpenGL to draw with.
+    hint : what mouse and keys do now has changed.
+    playing : set while the timeline plays, so that nothing slow is begun.
+    """
+
+    painted = Signal()
+    settled = Signal()
+    failed = Signal(str)
+
+    def __init__(self, desk: Desk, hotkeys: Hotkeys, commands: Commands, window: QWidget, budget_ms: float) -> None:
+        super().__init__(QOpenGLWindow.UpdateBehavior.NoPartialUpdate)
+        self.setFormat(surface_format())
+        self.desk = desk
+        self.playing = False
+        self.eye = Eye(desk, self.pixels, self.devicePixelRatio)
+        self.gestures = Gestures(desk, self.eye, hotkeys, commands, window)
+        self.picture: LivePicture | None = None
+        self.frames = self.refined_frames = 0
+        self._budget_ms = budget_ms
+        self._ctx: moderngl.Context | None = None
+        self._screen: moderngl.Framebuffer | None = None
+        self._stale = True
+        self._moved = False  # the picture being painted was drawn anew
+        self._pointer: Pointer | None = None
+        self._pen = False  # the pen is down: what the system makes of it as a mouse is no event of its own
+        self._draw_watch, self._dab_watch = Stopwatch(), Stopwatch()
+        self._hud: tuple[float, list[HudLine]] = (0.0, [])
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.timeout.connect(self._rest_a_little)
+        self.frameSwapped.connect(self._swapped)
+        desk.changed.connect(self._document_changed)
+        desk.workspace_changed.connect(self._workspace_changed)
+        desk.session_replaced.connect(self._session_replaced)
+        desk.stroke_ended.connect(self._stroke_ended)
+
+    # -- what is shown -----------------------------------------------------------------------------------
+
+    def pixels(self) -> tuple[int, int]:
+        """Width and height of the picture in pixels of the framebuffer."""
+        ratio = self.devicePixelRatio()
+        return max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
+
+    def redraw(self) -> None:
+        """Something that is shown has changed."""
+        self._stale = True
+        self._rest.stop()
+        self.update()
+
+    @property
+    def at_rest(self) -> bool:
+        """True when the picture is finished and nothing more will change it."""
+        picture = self.picture
+        return picture is not None and picture.settled and not self._stale and not self._rest.isActive()
+
+    def scale_density(self, factor: float) -> None:
+        """Draw so many times as many hairs while the hand moves."""
+        if self.picture is not None:
+            density = self.picture.density
+            density.budget_ms *= factor
+            density.hairs = max(round(density.hairs * factor), density.floor)
+            self.redraw()
+
+    def set_budget(self, milliseconds: float) -> None:
+        """How long a moving picture may take."""
+        self._budget_ms = milliseconds
+        if self.picture is not None:
+            self.picture.density.budget_ms = milliseconds
+
+    def release_gl(self) -> None:
+        """Give back everything on the graphics card, while there is a context to do it in."""
+        self._rest.stop()
+        if self.picture is not None and self.context() is not None:
+            self.makeCurrent()
+            self.picture.release()
+            self.picture = None
+            if self._ctx is not None:
+                self._ctx.release()
+                self._ctx = self._screen = None
+            self.doneCurrent()
+
+    # -- painting ----------------------------------------------------------------------------------------
+
+    def initializeGL(self) -> None:
+        """Take hold of the context Qt made; say so when it is too old."""
+        try:
+            self._ctx = moderngl.create_context(require=330)
+        except Exception as error:  # glcontext raises bare Exceptions
+            self.failed.emit(NO_GL.format(found=_version(self.context(), error)))
+            return
+        self._ctx.gc_mode = "context_gc"
+        self._screen = self._ctx.detect_framebuffer(0)
+        try:
+            self.picture = LivePicture(
+                self._ctx, self.desk.session, letters, self._start_job, self.redraw, self._budget_ms)
+        except Exception as error:  # a driver that promises 3.3 and fails at the first shader
+            self.failed.emit(NO_GL.format(found=_version(self.context(), error)))
+
+    def paintGL(self) -> None:
+        """One picture: drawn anew when something changed, else the one there is with the ring over it."""
+        if self.picture is None or self._screen is None:
+            return
+        picture, drawing = self.picture, self._stale
+        self._moved = False
+        if drawing:
+            self._stale = False
+            self._draw_watch.start()
+            moving = self.desk.session.stroking or self.playing
+            if picture.follow(self.eye.camera, self.pixels(), moving) or picture.shown < 0:
+                picture.draw()
+                self._moved = True
+        picture.present(self._screen, self._overlays(), self._hud_lines(), self.devicePixelRatio())
+
+    def resizeGL(self, width: int, height: int) -> None:
+        """Another size is another picture."""
+        self._stale = True
+
+    def _swapped(self) -> None:
+        if self._moved and self.picture is not None:
+            self._moved = False
+            took = self._draw_watch.stop()
+            self.frames += 1
+            if took is not None:
+                self.picture.density.frame(took)
+        self.painted.emit()
+        if self.picture is not None and not self.picture.settled and not self._rest.isActive() and not self._busy():
+            self._rest.start(CALM_MS)
+
+    def _busy(self) -> bool:
+        return self.gestures.drag is not None or self.playing
+
+    def _rest_a_little(self) -> None:
+        """One slice of finishing; the next comes after whatever events there are."""
+        picture = self.picture
+        if picture is None or self._busy() or self._stale or not self.isExposed():
+            return
+        self.makeCurrent()
+        more = picture.rest(self.eye.camera)
+        if picture.view.picture_changed:
+            self.refined_frames += 1
+            self.update()
+        if more:
+            self._rest.start(0)
+        elif picture.settled:
+            self._hud = (0.0, [])
+            self.update()
+            self.settled.emit()
+
+    def _start_job(self, job: Job, done: Callable[[Done], None], failed: Callable[[Exception], None]) -> None:
+        self.desk.jobs.start(job.name, lambda progress, cancelled: job.run(), done, failed)
+
+    # -- what is drawn over it ---------------------------------------------------------------------------
+
+    def _overlays(self) -> Overlays:
+        gestures, pointer = self.gestures, self._pointer
+        if pointer is None or isinstance(gestures.drag, CameraDrag):
+            return gestures.overlays()
+        if isinstance(gestures.drag, BrushDrag):
+            pointer = pointer._replace(x=gestures.drag.x, y=gestures.drag.y)
+        width, height = self.pixels()
+        stroke = gestures.stroke
+        sight = Sight(self.eye.camera, width, height) if stroke is None else stroke.sight
+        try:
+            ring = self.desk.session.hand.hover(sight, pointer if stroke is None else stroke.pointer)
+        except Exception as error:  # of a studio's own tool: the picture goes on without its marks
+            self.desk.error(UserError(f"{self.desk.session.tool.label} cannot show its ring ({error})."))
+            ring = ()
+        return ring + gestures.overlays()
+
+    def _hud_lines(self) -> list[HudLine]:
+        picture, now = self.picture, time.monotonic()
+        if picture is None or self._ctx is None:
+            return []
+        if now - self._hud[0] < HUD_EVERY and self._hud[1]:
+            return self._hud[1]
+        guides = sum(len(groom.guides) for groom in self.desk.document.grooms)
+        lines: list[HudLine] = []
+        if self.desk.document.grooms:
+            lines += [(self.desk.session.tool.label, "accent"), f"guides {guides:,}"]
+        if picture.total:
+            shown = picture.total if picture.settled else min(picture.shown, picture.total)
+            lines.append(f"hairs {picture.total:,}" if shown == picture.total else
+                         f"hairs {shown:,} of {picture.total:,}")
+        state = "finished" if picture.settled else "growing" if picture.growing else "refining"
+        dab = f"dab {self._dab_watch.ms:.0f} ms · " if self._dab_watch.ms else ""
+        lines.append(f"{dab}draw {self._draw_watch.ms:.0f} ms · {state}")
+        lines.append(f"{_short(self._ctx.info['GL_RENDERER'])} · GL {self._ctx.version_code / 100:.1f}")
+        lines += [(trouble, "trouble") for trouble in picture.troubles]
+        self._hud = (now, lines)
+        return lines
+
+    # -- what changes ------------------------------------------------------------------------------------
+
+    def _document_changed(self, old: Document, new: Document) -> None:
+        self.redraw()
+
+    def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
+        if old.frame != new.frame or old.view is not new.view or old.groom != new.groom or old.cameras is not new.cameras:
+            self.redraw()
+        else:
+            self._hud = (0.0, [])
+            self.update()
+
+    def _session_replaced(self) -> None:
+        self.gestures.drag = None
+        if self.picture is not None:
+            self.picture.replace_session(self.desk.session)
+        self._hud = (0.0, [])
+        self.redraw()
+
+    def _stroke_ended(self) -> None:
+        if self.picture is not None:
+            self.picture.density.end_stroke()
+        self.redraw()
+
+    # -- events ------------------------------------------------------------------------------------------
+
+    def event(self, event: QEvent) -> bool:
+        """Gathered samples go to the hand just before a picture; keys of what goes on here are no hotkeys."""
+        kind = event.type()
+        if kind == QEvent.Type.UpdateRequest:
+            self._frame()
+        elif kind == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            if self.gestures.takes(Qt.Key(event.key())):
+                event.accept()
+                return True
+        elif kind == QEvent.Type.Leave:
+            self._pointer = None
+            self.update()
+        elif kind == QEvent.Type.Enter:
+            self._take_focus()
+        elif kind == QEvent.Type.NativeGesture and isinstance(event, QNativeGestureEvent):
+            return self._pinch(event)
+        return super().event(event)
+
+    def exposeEvent(self, event: QExposeEvent) -> None:
+        """Shown or hidden: go on finishing, or stop."""
+        super().exposeEvent(event)
+        if self.isExposed():
+            self.update()
+        else:
+            self._rest.stop()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Another size is another picture."""
+        super().resizeEvent(event)
+        self.redraw()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """A button goes down."""
+        button = BUTTON_NAMES.get(event.button())
+        self.requestActivate()
+        if button is not None and not self._pen:
+            self._press(button, event.modifiers(), mouse_pointer(event, self.devicePixelRatio()),
+                        event.globalPosition().toPoint())
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """The second press of a quick pair is a press."""
+        self.mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """The mouse moved."""
+        if not self._pen:
+            self._move(mouse_pointer(event, self.devicePixelRatio()), event.globalPosition().toPoint())
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """A button goes up."""
+        button = BUTTON_NAMES.get(event.button())
+        if button is not None and not self._pen:
+            self._release(button)
+
+    def tabletEvent(self, event: QTabletEvent) -> None:
+        """A pen: accepted whatever it says, so that the system makes no mouse of it."""
+        event.accept()
+        pointer = pen_pointer(event, self.devicePixelRatio())
+        place, button = event.globalPosition().toPoint(), BUTTON_NAMES.get(event.button(), "LMB")
+        if event.type() == QEvent.Type.TabletPress:
+            self._pen = True
+            self.requestActivate()
+            self._press(button, event.modifiers(), pointer, place)
+        elif event.type() == QEvent.Type.TabletRelease:
+            self._release(button)
+            self._pen = False
+        else:
+            self._move(pointer, place)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """The wheel, or two fingers."""
+        notches = event.angleDelta().y() / 120.0 or event.angleDelta().x() / 120.0  # Alt turns the wheel sideways
+        place = place_pointer(event.position(), self.devicePixelRatio(), event.modifiers())
+        if notches:
+            self.gestures.wheel(notches, modifier_names(event.modifiers()), place)
+        event.accept()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """A key that is no hotkey."""
+        if event.isAutoRepeat() and not isinstance(self.gestures.drag, BrushDrag):
+            return
+        pointer = self._pointer or place_pointer(
+            QPointF(self.mapFromGlobal(QCursor.pos())), self.devicePixelRatio(), event.modifiers())
+        if not self.gestures.key(
+            Qt.Key(event.key()), event.text(), modifier_names(event.modifiers()), pointer, QCursor.pos()
+        ):
+            self._change_modifiers(event.modifiers())
+            event.ignore()
+        self.update()
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        """A key goes up."""
+        if not event.isAutoRepeat():
+            self.gestures.key_up(Qt.Key(event.key()))
+            self._change_modifiers(QGuiApplication.queryKeyboardModifiers())
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """Without the keyboard nothing may hang."""
+        if self.gestures.radial is None:
+            self.gestures.leave()
+        super().focusOutEvent(event)
+
+    def _press(self, button: str, modifiers: Qt.KeyboardModifier, pointer: Pointer, place: QPoint) -> None:
+        self._pointer = pointer
+        self.gestures.press(button, modifier_names(modifiers), pointer, place)
+        drag = self.gestures.drag
+        if self.gestures.stroke is not None and self.picture is not None:
+            self.picture.density.begin_stroke()
+        if isinstance(drag, CameraDrag):
+            self.setCursor(Qt.CursorShape.ClosedHandCursor)
+        self._rest.stop()
+        self.update()
+
+    def _move(self, pointer: Pointer, place: QPoint) -> None:
+        self._pointer = pointer
+        if self.gestures.radial is not None:
+            self.gestures.radial.point_to(place)
+            return
+        self.gestures.move(pointer)
+        self.update()
+
+    def _release(self, button: str) -> None:
+        if self.gestures.radial is not None:
+            self.gestures.radial.let_go()
+            return
+        self.gestures.release(button)
+        if self.gestures.drag is None:
+            self.unsetCursor()
+        self.update()
+
+    def _frame(self) -> None:
+        stroking = self.gestures.stroke is not None
+        if stroking:
+            self._dab_watch.start()
+        self.gestures.frame()
+        if stroking:
+            self._dab_watch.stop()
+
+    def _pinch(self, event: QNativeGestureEvent) -> bool:
+        if event.gestureType() != Qt.NativeGestureType.ZoomNativeGesture or self.gestures.drag is not None:
+            return False
+        place = place_pointer(event.position(), self.devicePixelRatio(), event.modifiers())
+        self.eye.pinch(place.x, place.y, 1.0 / max(1.0 + event.value(), 0.1))
+        return True
+
+    def _change_modifiers(self, modifiers: Qt.KeyboardModifier) -> None:
+        """The ring shows what Shift or Ctrl would do now."""
+        if self._pointer is not None:
+            names = modifier_names(modifiers)
+            self._pointer = self._pointer._replace(shift="Shift" in names, ctrl="Ctrl" in names, alt="Alt" in names)
+            self.update()
+
+    def _take_focus(self) -> None:
+        """Keys go where the hand is, unless something is being typed."""
+        focus = QGuiApplication.focusObject()
+        typing = focus is not None and focus.inherits("QWidget") and focus.property("readOnly") is not None
+        if not typing and QGuiApplication.focusWindow() is not None and not self.isActive():
+            return
+        if not typing:
+            self.requestActivate()
+
+
+def surface_format() -> QSurfaceFormat:
+    """OpenGL 3.3 core without samples: edges are smoothed at rest, which costs the hand nothing."""
+    wanted = QSurfaceFormat()
+    wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
+    wanted.setVersion(3, 3)
+    wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+    wanted.setDepthBufferSize(0)
+    wanted.setStencilBufferSize(0)
+    wanted.setSamples(0)
+    wanted.setSwapInterval(0)
+    return wanted
+
+
+def letters(words: str, pixels: float, color: Byte3) -> NDArray[np.uint8]:
+    """Words in the window's own font: (H, W, 4) uint8, red green blue and opacity (see viewport.hud)."""
+    font = text_font(look_of(), max(round(pixels), 1))
+    probe = QImage(1, 1, QImage.Format.Format_RGBA8888)
+    painter = QPainter(probe)
+    painter.setFont(font)
+    width, height, rise = (
+        painter.fontMetrics().horizontalAdvance(words), painter.fontMetrics().height(), painter.fontMetrics().ascent())
+    painter.end()
+    image = QImage(max(width, 1) + 2, max(height, 1), QImage.Format.Format_RGBA8888_Premultiplied)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
+    painter.setFont(font)
+    painter.setPen(QColor(255, 255, 255))
+    painter.drawText(1, rise, words)
+    painter.end()
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine())
+    opacity = rows[:, 3 : 4 * image.width() : 4]
+    letters_of = np.empty((*opacity.shape, 4), np.uint8)
+    letters_of[..., :3], letters_of[..., 3] = color, opacity
+    return letters_of
+
+
+def _version(context: object, error: Exception) -> str:
+    found = context.format() if context is not None else None  # type: ignore[attr-defined]
+    return "none" if found is None else f"{found.majorVersion()}.{found.minorVersion()}"
+
+
+def _short(renderer: str) -> str:
+    return renderer.split(" (", maxsplit=1)[0].split("/", maxsplit=1)[0]
