@@ -110,7 +110,9 @@ class CoatBinding:
             and np.array_equal(self._ids[kept], guides.ids[: len(kept)])
             and _same_roots(self._roots, kept, guides.roots)
         )
-        return count if stays else None
+        if not stays or (count and self._sites.must_rebuild(gone, self._places_of(guides, new)[0])):
+            return None
+        return count
 
     def update(self, guides: Guides, children: Children) -> NDArray[np.int32]:
         """Follow planted, deleted and re-rooted guides; the rows of `children` to evaluate again.
@@ -130,7 +132,7 @@ class CoatBinding:
             children.guide_removed(int(row))
             rows.append(children.rebind(rebound))
         if len(new):
-            triangle, bary = triangle_places(self._mesh, self._triangles, guides.roots.take(new))
+            triangle, bary = self._places_of(guides, new)
             for t, b in zip(triangle, bary, strict=True):
                 rows.append(children.rebind(self._sites.add_site(int(t), b)))
         self._ids, self._roots = guides.ids, guides.roots
@@ -140,6 +142,9 @@ class CoatBinding:
         """Give this binding to all `children`; their rows."""
         bound = self.binding()
         return children.rebind(Rebound(np.arange(len(children), dtype=np.int32), bound.sites, bound.weights))
+
+    def _places_of(self, guides: Guides, rows: NDArray[np.intp]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        return triangle_places(self._mesh, self._triangles, guides.roots.take(rows))
 
     def _difference(
         self, guides: Guides

@@ -316,6 +316,17 @@ class SurfaceSites:
         self.edits += 1
         return self._changes()
 
+    def must_rebuild(self, removed: NDArray[np.integer], added_triangles: NDArray[np.int32]) -> bool:
+        """True when taking these rows away and then adding sites on these triangles cannot be done one by one, because
+        a piece of skin loses its last site or gets its first: everything is built anew then, which takes its time."""
+        vertex, face = self._vertex[removed], self._skin.face[added_triangles]
+        if (self._net.first[vertex] < 0).any() or (face < 0).any():
+            return True
+        left = self._sites_on.copy()
+        np.subtract.at(left, self._piece[vertex], 1)
+        touched = np.concatenate([self._piece[vertex], self._skin.component[self._net_vertex(face)]])
+        return bool((left[touched] < 1).any())
+
     def _rebuild(self) -> Rebound:
         self._build()
         bound = self.binding()

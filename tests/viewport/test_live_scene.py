@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 
+from core.camera import frame_points
 from core.demo.creature import demo_creature
 from core.document import Document, MeshObject, with_groom, with_mesh
 from core.errors import UserError
@@ -27,6 +28,7 @@ from viewport.document_scene import scene_of
 from viewport.live_guides import FROZEN, PLAIN, SELECTED, SPRAYED, TROUBLE
 from viewport.live_scene import Change, LiveScene
 from viewport.posed_frames import PosedFrames
+from viewport.view import View3D
 
 HAIRS, GUIDES = 1500, 120
 
@@ -362,3 +364,38 @@ def test_poses_are_kept_within_their_budget_the_longest_unused_dropped(document,
         few.posed(item, frame)
         assert few.bytes <= 3 * size
     assert few.cached(document) == [1010, 1012, 1013]
+
+
+def test_a_picture_of_rows_written_in_place_is_that_of_a_scene_made_anew(document, evaluator, ctx):
+    size = (160, 120)
+    framebuffer = ctx.framebuffer([ctx.texture(size, 4)])
+    camera = frame_points(document.meshes[0].mesh.points, (-0.6, -0.2, -0.7))
+
+    def picture(view: View3D) -> bytes:
+        view.draw_interactive(800)
+        for _ in view.refine():
+            pass
+        view.present(framebuffer, size)
+        return framebuffer.read(components=3)
+
+    def show(view: View3D, change: Change) -> None:
+        view.begin(change.scene, camera, size)
+        for points, rows in change.rows:
+            view.rows_changed(points, rows)
+
+    live, view = LiveScene(evaluator), View3D(ctx)
+    show(view, rest(live, document))
+    first = picture(view)
+    later = edited(document, lambda g: combed(g, range(40), 0.03))
+    show(view, live.update(later, 1001.0, stroking=True, hairs=800))
+    moving = picture(view)
+    while (change := live.catch_up()) is not None:
+        show(view, change)
+    show(view, live.update(later, 1001.0, hairs=800))
+    now = picture(view)
+    other = View3D(ctx)
+    show(other, rest(LiveScene(evaluator), later))
+    assert picture(other) == now
+    assert len({first, moving, now}) == 3
+    view.release()
+    other.release()

@@ -16,10 +16,10 @@ from core.groom.commands import COMMANDS, SkinContext
 from core.groom.groom import Coat, Groom, Map
 from core.groom.grow import grow
 from core.groom.live_coat import MOST_AT_ONCE, LiveCoat, bind_coat
-from core.groom.plant import plant_scatter
+from core.groom.plant import plant, plant_scatter
 from core.groom.rows import no_guides, take_rows
 from core.mesh.normals import mesh_normals
-from core.mesh.skin import Posed, skin_posed
+from core.mesh.skin import Posed, skin_at_rest, skin_posed
 from core.record import freeze
 from core.value import constant, formula
 from tests.core.groom.small_grooms import ball, fur
@@ -264,6 +264,31 @@ def test_many_guides_at_once_wait_for_a_binding():
     assert live.needs_binding(stroking=True)
     rest(live, few, 1.0, None, hard)
     same_as_grown(live, few, 1.0)
+
+
+def test_the_first_guide_on_a_piece_of_skin_and_the_last_wait_for_a_binding():
+    one = mesh_of()
+    n = len(one.points)
+    two = one.replace(
+        points=freeze(np.concatenate([one.points, one.points + np.float32([3.0, 0.0, 0.0])])),
+        corners=freeze(np.concatenate([one.corners, one.corners + n])), counts=freeze(np.tile(one.counts, 2)),
+        parts=freeze(np.zeros(2 * len(one.parts), np.int32)),
+    )
+    groom = groom_of().replace(maps=())  # its guides stand on the first ball
+    live = LiveCoat(groom, two, EVALUATOR, 1.0)
+    hard = collision(two, two.points, EVALUATOR)
+    skin = skin_at_rest(two, EVALUATOR)
+    there = np.array([len(one.counts) + 7], np.int32)
+    guides = plant(groom.guides, skin, there, np.full((1, 3), 1 / 3, np.float32), length=0.3)
+    planted = groom.replace(guides=guides)
+    assert len(live.follow(planted, 1.0)) == 0
+    assert live.needs_binding(stroking=True)
+    rest(live, planted, 1.0, None, hard)
+    same_as_grown(live, planted, 1.0)
+    live.follow(groom, 1.0)
+    assert live.needs_binding(stroking=True)
+    rest(live, groom, 1.0, None, hard)
+    same_as_grown(live, groom, 1.0)
 
 
 def test_a_planted_guide_is_followed_at_once_and_bound_properly_at_rest():
