@@ -1,9 +1,26 @@
 """The scene of a document while it is edited: arrays stay the same objects where nothing changed.
 
-:meth:`LiveScene.update` follows the document and the frame at once, cheaply; what is owed afterwards is paid by
-:meth:`LiveScene.catch_up` in slices while the hand rests. What takes longer than a moment (growing a coat, binding it
-anew, preparing a skin to settle hairs on) is offered by :meth:`LiveScene.wanted_jobs` as plain functions for another
-thread, whose results :meth:`LiveScene.adopt` takes; until then guides and the hairs there are stand in.
+For a window with a :class:`viewport.view.View3D`::
+
+    live = LiveScene(session.evaluator)
+
+    # after any change of the document, the frame or the options, while a hand moves or the timeline plays
+    show(live.update(document, frame, options, stroking=True, hairs=controller.drawn))
+
+    # when the hand rests: once, then a slice from a timer of 0 ms until None; refine the picture only after that
+    show(live.update(document, frame, options, hairs=controller.drawn))
+    change = live.catch_up()                                 # None: nothing is owed
+    if change is not None: show(change)
+
+    # after every update: what takes long is done on other threads, and update is called again when one is done
+    for job in live.wanted_jobs(): start(job.run)            # returns `done`: live.adopt(done), on the window's thread
+                                                             # fails or is cancelled: live.abandon(job, error or None)
+
+    def show(change):
+        view.begin(change.scene, camera, size, options)
+        for points, rows in change.rows: view.rows_changed(points, rows)
+
+Until a coat has grown its guides stand alone; while another one grows, the old one stays where it still fits.
 """
 
 from __future__ import annotations
