@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.window.commands import Command, Window
 from core.falloff import SHAPES
+from tools.groom.actions import ACTIONS, Action
 from tools.registry import Registry
 from tools.tool import Tool
 
@@ -74,6 +75,26 @@ def tool_commands(registry: Registry) -> tuple[Command, ...]:
     return tuple(tool_command(tool) for tool in registry)
 
 
+def _act(name: str) -> Callable[[Window], None]:
+    return lambda window: window.desk.session.act(name)
+
+
+def _needs_guides(desk: Desk) -> str | None:
+    groom = desk.groom
+    if groom is None:
+        return "There is no groom yet: import a mesh and groom it first."
+    return None if len(groom.guides) else "This groom has no guides yet: plant some first."
+
+
+def action_command(action: Action) -> Command:
+    """The command that does an action to the groom with its usual settings."""
+    return Command(
+        f"groom.{action.name}", action.label, action.tooltip, _act(action.name), "tools.session.Session.act",
+        "document", action.step, _needs_guides, icon=action.icon, scope="viewport", words="action guides hair")
+
+
+ACTION_COMMANDS: tuple[Command, ...] = tuple(action_command(action) for action in ACTIONS.values())
+
 HAND: tuple[Command, ...] = (
     Command(
         "tool.larger", "Larger brush", "Makes the ring of the brush 15 percent larger, in pixels or on the skin.",
@@ -111,3 +132,17 @@ HAND: tuple[Command, ...] = (
         "tool.respect_selection", "Respect the selection", "Lets tools edit only selected guides while there are any.",
         _respects("selection"), _RESPECT, checked=_is_respected("selection"), icon="select", words="mask only"),
 )
+
+# commands around the hand in the order of radial.DIRECTIONS: up, right, down, left, then from the upper right on round;
+# what stands in one direction stands there for every tool of its kind, so that the hand can learn it
+RADIAL = (
+    "tool.comb", "tool.smooth", "tool.length", "tool.select", "edit.redo", "tool.plant", "tool.hairspray", "edit.undo")
+_SELECTING = (
+    "groom.select_all", "groom.select_more", "groom.select_none", "groom.select_inverse", "edit.redo",
+    "groom.freeze_selected", "groom.delete_selected", "edit.undo")
+RADIALS = {"select": _SELECTING, "lasso": _SELECTING, "islands": _SELECTING}
+
+
+def radial_names(tool: str) -> tuple[str, ...]:
+    """Commands of the radial menu while a tool is in the hand, at most eight."""
+    return RADIALS.get(tool, RADIAL)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.window.all_commands import all_commands
 from app.window.commands import Command
 from app.window.icons import icon_names
+from app.window.radial import MOST
+from app.window.tool_commands import radial_names
 from core.camera import Camera, frame_points, look_at
+from core.document import with_groom
 from core.errors import UserError
 from tests.window.host import Host
 from tools.registry import Registry
@@ -64,13 +68,43 @@ def test_names_and_labels_are_unique_and_every_tool_is_there(host: Host) -> None
         host.commands.add([host.commands["edit.undo"]])
 
 
-@pytest.mark.parametrize("command", [c for c in TABLE if c.name in ("view.hide", "view.unhide_all")],
+ASKING = ("file.import_mesh", "file.reload_mesh")  # these ask for a file first; the window's own tests drive them
+BEFORE = {
+    "view.unhide_all": "view.hide", "groom.thaw_all": "groom.freeze_others", "groom.wash_all": "groom.spray_selected"}
+
+
+@pytest.mark.parametrize("command", [c for c in TABLE if c.undo is not None and c.name not in ASKING],
                          ids=lambda c: c.name)
 def test_the_step_has_the_name_it_promises(command: Command, host: Host) -> None:
-    if command.name == "view.unhide_all":
-        host.commands.run("view.hide")
-    assert host.commands.run(command.name)
+    bend_and_select(host)
+    if command.name in BEFORE:
+        assert host.commands.run(BEFORE[command.name]), host.failed
+    before = host.desk.document
+    assert host.commands.run(command.name), host.failed
+    assert host.desk.document is not before
     assert host.desk.session.history.undo_name == command.undo
+    host.commands.run("edit.undo")
+    assert host.desk.document is before
+
+
+def bend_and_select(host: Host) -> None:
+    """Bent hair, half of it selected, some of it through the skin: there is something to do for every command."""
+    document = host.desk.document
+    groom = document.grooms[0]
+    points = groom.guides.points.copy()
+    points[:, 2, 0] += np.linspace(0.01, 0.05, len(points))
+    points[0, -1, 1] = -0.05
+    selected = np.arange(len(points)) % 2 == 0
+    host.desk.session.commit("Bend", with_groom(document, groom.replace(
+        guides=groom.guides.replace(points=points, selected=selected))))
+
+
+def test_every_tool_has_a_radial_menu_of_commands(host: Host) -> None:
+    for tool in host.desk.session.tools:
+        names = radial_names(tool.name)
+        assert len(names) <= MOST
+        assert len(set(names)) == len(names)
+        assert all(name in host.commands for name in names)
 
 
 def test_undo_and_redo_say_why_they_cannot(host: Host) -> None:
@@ -214,7 +248,7 @@ def test_theme_and_text(host: Host) -> None:
 @pytest.mark.parametrize(("words", "name"), [
     ("undo", "edit.undo"), ("save", "file.save"), ("redo again", "edit.redo"), ("frame sel", "view.frame_selected"),
     ("import", "file.import_mesh"), ("screenshot", "file.screenshot"), ("wireframe", "view.wire"),
-    ("mirror", "tool.symmetry"), ("bigger brush", "tool.larger"), ("hotkey", "window.keymap"),
+    ("both sides", "tool.symmetry"), ("mirror", "groom.mirror"), ("bigger brush", "tool.larger"), ("hotkey", "window.keymap"),
     ("prefrences", "window.preferences"), ("symetry", "tool.symmetry"), ("view top", "view.top"),
     ("pyth", "window.console"), ("comb", "tool.comb"),
 ])
