@@ -101,6 +101,8 @@ class ToolPanel(_Panel):
     def edited(self, record: Record, final: bool) -> None:
         params = {name: getattr(record, name) for name in record.__struct_fields__}
         self.desk.choose(self.desk.session.tool.name, **params)
+        if final:
+            self.refresh()  # what was refused goes back to what it was
 
 
 class RespectPanel(_Panel):

@@ -116,13 +116,17 @@ class FieldWidget(QWidget):
         lines = [f"<b>{html.escape(self.known.label)}</b> &nbsp; {html.escape(self.words())}",
                  html.escape(self.known.tooltip)]
         if self.default is not None:
-            lines.append(f"Usually {html.escape(self.words_of(self.default))}.")
+            lines.append(f"Usually {html.escape(self.words_of(self.default))}.{html.escape(self.limits())}")
         lines.append(f"<span style='color:{look_of().theme.dim}'>{html.escape(self.gestures())}</span>")
         return "<p style='white-space:normal'>" + "<br>".join(lines) + "</p>"
 
     def words_of(self, value: Any) -> str:
         """Any value of this field in words."""
         return str(value)
+
+    def limits(self) -> str:
+        """What may be typed, in words that follow a sentence, or ""."""
+        return ""
 
     def gestures(self) -> str:
         """How it is edited, in a few words."""

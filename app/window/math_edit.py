@@ -23,6 +23,7 @@ class MathEdit(QLineEdit):
     def __init__(self, text: str, name: str, parent: QWidget) -> None:
         super().__init__(text, parent)
         self.setAccessibleName(name)
+        self.setTextMargins(-2, 0, -2, 0)  # so that the words stand where the bar has them
         self._note: QLabel | None = None
         self.textEdited.connect(lambda _: self.clear_fault())
 

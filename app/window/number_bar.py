@@ -49,6 +49,7 @@ class NumberBar(FieldWidget):
         self._rest.setSingleShot(True)
         self._rest.setInterval(WHEEL_RESTS)
         self._rest.timeout.connect(self.finish)
+        self.setCursor(Qt.CursorShape.SizeHorCursor)
         self.value_shown()
 
     def set_unit(self, unit: str) -> None:
@@ -91,6 +92,11 @@ class NumberBar(FieldWidget):
     def words_of(self, value: Any) -> str:
         return shown(float(value), self.scale)
 
+    def limits(self) -> str:
+        if self.known.hard is None:
+            return ""
+        return f" From {self.words_of(self.known.hard[0])} to {self.words_of(self.known.hard[1])}."
+
     def gestures(self) -> str:
         return "Drag (Shift fine, Ctrl steps) · double-click to type, with units · right button for more"
 
@@ -108,6 +114,7 @@ class NumberBar(FieldWidget):
             start = editable(float(self._value), self.scale) if text is None else text
             self.line = MathEdit(start, self.known.label, self)
             self.line.setAlignment(Qt.AlignmentFlag.AlignRight)
+            self.line.setCursor(Qt.CursorShape.IBeamCursor)
             self.line.entered.connect(self._typed)
             self.line.left.connect(self._left)
             self.line.given_up.connect(lambda: self._close_line(True))

@@ -276,6 +276,9 @@ def test_it_says_its_name_value_and_what_it_does(qtbot: QtBot) -> None:
     assert bar.accessibleName() == "Lift"
     assert bar.accessibleDescription() == "30.0°"
     assert "stands off the skin" in bar.toolTip()
+    limited = NumberBar(PLAIN, 0.5, 0.6)
+    qtbot.addWidget(limited)
+    assert "Usually 0.60. From 0.00 to 2.00." in limited.toolTip()
     assert bar.focusPolicy() & Qt.FocusPolicy.TabFocus
 
 

@@ -262,6 +262,19 @@ def test_sections_fold_and_remember_it(qtbot: QtBot, tmp_path: Path) -> None:
     assert "Coat" not in FoldMemory(tmp_path)
 
 
+def test_a_folded_section_leaves_no_hole(qtbot: QtBot, tmp_path: Path) -> None:
+    column = Column()
+    first, second = (Section(name, RecordForm(Brush()), FoldMemory(tmp_path)) for name in ("One", "Two"))
+    column.add(first)
+    column.add(second)
+    shown(qtbot, column)
+    below = second.y()
+    first.fold(True)
+    qtbot.waitUntil(lambda: second.y() < first.y() + 2 * first.header.height())
+    first.fold(False)
+    qtbot.waitUntil(lambda: second.y() == below)
+
+
 def test_the_shelf_has_every_tool_and_shows_the_active_one(qtbot: QtBot, desk: Desk) -> None:
     shelf = Shelf(desk, lambda name: "C" if name == "comb" else "")
     shown(qtbot, shelf, shelf.sizeHint().width(), 900)
