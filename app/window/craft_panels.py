@@ -12,7 +12,7 @@ from app.window.sections import FoldMemory, Section
 from core.document import Document, find_groom, with_groom
 from core.groom.groom import COAT_FIELDS, NAMES, Coat
 from core.record import Record
-from core.workspace import Respect
+from core.workspace import Respect, Workspace
 
 
 class _Panel(Section):
@@ -30,7 +30,11 @@ class _Panel(Section):
         self._unit = "document"
         desk.session_replaced.connect(self.refresh)
         desk.stroke_ended.connect(self.refresh)
-        desk.workspace_changed.connect(lambda old, new: self.refresh())
+        desk.workspace_changed.connect(self._workspace_changed)
+
+    def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
+        if not self.desk.session.stroking:
+            self.refresh()
 
     @property
     def unit(self) -> str:
@@ -137,7 +141,7 @@ class CoatPanel(_Panel):
             return
         maps = tuple(m.name for m in groom.maps)
         self.show_record(groom.id, groom.coat, Setting(
-            self.unit, self.desk.workspace.frame, (*NAMES, *maps), maps))
+            self.unit, self.desk.workspace.frame, NAMES, maps))
 
     def edited(self, coat: Coat, final: bool) -> None:
         session, groom = self.desk.session, self.desk.groom

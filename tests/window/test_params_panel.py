@@ -180,6 +180,18 @@ def test_the_tool_panel_follows_the_tool_and_changes_its_parameters(qtbot: QtBot
     assert list(panel.form.fields) == ["radius"]
 
 
+def test_switching_tools_leaves_no_widgets_behind(qtbot: QtBot, desk: Desk) -> None:
+    shown(qtbot, ToolPanel(desk))
+    counts = []
+    for _ in range(6):
+        for name in ("studio_1", "comb"):
+            desk.choose(name)
+            QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+            QApplication.processEvents()
+        counts.append(len(QApplication.allWidgets()))
+    assert len(set(counts[1:])) == 1, counts
+
+
 def test_the_respect_panel_is_the_workspace(qtbot: QtBot, desk: Desk) -> None:
     panel = RespectPanel(desk)
     shown(qtbot, panel)
