@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.window.commands import Command
-from app.window.file_commands import EDIT, FILE
+from app.window.file_commands import EDIT, FILE, MACRO
 from app.window.tool_commands import ACTION_COMMANDS, HAND, tool_commands
 from app.window.view_commands import FRAME, VIEW
 from app.window.window_commands import WINDOW
@@ -12,4 +12,4 @@ from tools.registry import Registry
 
 def all_commands(registry: Registry) -> tuple[Command, ...]:
     """Every command there is, in the order of the menus; those of the tools come from `registry`."""
-    return (*FILE, *EDIT, *VIEW, *FRAME, *tool_commands(registry), *HAND, *ACTION_COMMANDS, *WINDOW)
+    return (*FILE, *EDIT, *VIEW, *FRAME, *tool_commands(registry), *HAND, *ACTION_COMMANDS, *MACRO, *WINDOW)

@@ -1,4 +1,4 @@
-"""Commands of files, of undo and of the hand's recordings."""
+"""Commands of files, of undo and of macros."""
 
 from __future__ import annotations
 
@@ -30,6 +30,14 @@ def _can_undo(desk: Desk) -> str | None:
 
 def _can_redo(desk: Desk) -> str | None:
     return None if desk.session.history.redo_name else "There is nothing to redo."
+
+
+def _recording(desk: Desk) -> str | None:
+    return None if desk.session.recording is not None else "Nothing is recorded: begin with Record a macro."
+
+
+def _not_recording(desk: Desk) -> str | None:
+    return None if desk.session.recording is None else "A macro is being recorded: save or forget it first."
 
 
 FILE: tuple[Command, ...] = (
@@ -90,4 +98,22 @@ EDIT: tuple[Command, ...] = (
         "edit.revert", "Undo everything", "Goes back to the first step that is remembered; redo leads forward again.",
         lambda w: w.desk.session.jump(0), "tools.session.Session.jump", "history", enabled=_can_undo,
         words="revert first beginning history"),
+)
+
+MACRO: tuple[Command, ...] = (
+    Command(
+        "macro.record", "Record a macro", "Notes every stroke, action and edit from now on, to do them again later.",
+        lambda w: w.desk.session.record(), "tools.session.Session.record", "window", enabled=_not_recording,
+        icon="record", words="script start repeat automate", checked=lambda desk: desk.session.recording is not None),
+    Command(
+        "macro.save", "Save the macro…", "Ends the recording and writes it as a Python script you can read.",
+        lambda w: w.save_macro(), "tools.macro.Macro.save", "file", enabled=_recording, icon="save",
+        words="script stop end recording"),
+    Command(
+        "macro.discard", "Forget the macro", "Ends the recording without keeping it; what was done stays done.",
+        lambda w: w.desk.session.stop_recording(), "tools.session.Session.stop_recording", "window",
+        enabled=_recording, icon="stop", words="script stop cancel recording"),
+    Command(
+        "macro.play", "Play a macro…", "Does again what a macro says; each of its strokes can be undone.",
+        lambda w: w.play_macro(), "tools.macro.play", "history", icon="play", words="script run repeat batch"),
 )

@@ -234,6 +234,21 @@ def test_undo_amidst_a_stroke_takes_the_stroke_back(host: Host) -> None:
     assert host.desk.session.history.redo_name == "Comb"
 
 
+def test_a_macro_is_recorded_and_forgotten(host: Host) -> None:
+    session = host.desk.session
+    assert host.commands.reason("macro.save") is not None
+    assert host.commands.run("macro.record")
+    macro = session.recording
+    assert macro is not None
+    assert not host.commands.run("macro.record")
+    host.commands.run("groom.select_all")
+    host.commands.run("view.hide")
+    assert [step.name for step in macro.steps] == ["select_all", "Hide"]
+    assert host.commands.reason("macro.save") is None
+    assert host.commands.run("macro.discard")
+    assert session.recording is None
+
+
 def test_theme_and_text(host: Host) -> None:
     host.commands.run("window.theme")
     assert host.settings.theme == "light"
@@ -248,7 +263,8 @@ def test_theme_and_text(host: Host) -> None:
 @pytest.mark.parametrize(("words", "name"), [
     ("undo", "edit.undo"), ("save", "file.save"), ("redo again", "edit.redo"), ("frame sel", "view.frame_selected"),
     ("import", "file.import_mesh"), ("screenshot", "file.screenshot"), ("wireframe", "view.wire"),
-    ("both sides", "tool.symmetry"), ("mirror", "groom.mirror"), ("bigger brush", "tool.larger"), ("hotkey", "window.keymap"),
+    ("both sides", "tool.symmetry"), ("mirror", "groom.mirror"), ("bigger brush", "tool.larger"),
+    ("hotkey", "window.keymap"), ("record", "macro.record"),
     ("prefrences", "window.preferences"), ("symetry", "tool.symmetry"), ("view top", "view.top"),
     ("pyth", "window.console"), ("comb", "tool.comb"),
 ])
