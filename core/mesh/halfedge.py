@@ -20,6 +20,8 @@ _F2 = types.Array(types.float64, 2, "C", readonly=True)
 _F1 = types.Array(types.float64, 1, "C")
 _B1 = types.Array(types.uint8, 1, "C")
 
+STAND_OFF = 4.0  # of a phantom, over the longest loop that is bridged; with less, fewer border triangles are Delaunay's
+
 
 class Manifold(NamedTuple):
     """A closed oriented manifold of triangles, with what is needed to find the soup's triangles again.
@@ -210,6 +212,8 @@ def _close(twin, origin, length, loops, edges, vertices, fill):  # type: ignore[
         spoke = total
         if total <= fill:  # about the flat cap of a round hole
             spoke = max(total / 6.0, 0.55 * longest)
+        elif fill > 0.0:  # near enough that Delaunay triangles along the border are not much longer
+            spoke = min(total, max(STAND_OFF * fill, longest))
         n = (used - start) // 3
         for i in range(n):
             mine = start + 3 * i
@@ -255,7 +259,9 @@ def manifold(points: NDArray[np.float64], triangles: NDArray[np.int32], fill: fl
     ----------
     points : (V, 3) float64; vertices at one place are welded.
     triangles : (T, 3) int32.
-    fill : loops of open edges up to this long are holes to be bridged.
+    fill : loops of open edges up to this long are holes to be bridged. The phantom of a longer one stands off by some
+        times as much, so that no sliver runs along the border from site to far site. 0: none is bridged, and phantoms
+        stand off by the length of their loop.
     """
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(axis=1))
     tri = np.ascontiguousarray(weld(np.where(finite[:, None], points, 0.0))[triangles], np.int32)

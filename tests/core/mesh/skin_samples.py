@@ -46,6 +46,18 @@ def sheet(n: int, jitter: float, rng: np.random.Generator) -> Skin:
     return points, np.array(triangles, np.int32)
 
 
+def folded_sheet(seed: int) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
+    """A sheet of 4 x 1 folded along the middle, its halves .02 apart: points, triangles, and points laid flat
+    (the fold at x = 0)."""
+    points, triangles = sheet(60, 0.3, np.random.default_rng(seed))
+    s, y = (points[:, 0] - 0.5) * 4.0, points[:, 1]
+    radius = 0.01
+    turn = np.clip(s / radius, -np.pi / 2, np.pi / 2)
+    straight = np.maximum(np.abs(s) - radius * np.pi / 2, 0.0)
+    folded = np.stack([radius * np.cos(turn) - straight, y, radius * np.sin(turn)], axis=1)
+    return folded, triangles, np.stack([s, y, np.zeros(len(s))], axis=1)
+
+
 def joined(*skins: Skin) -> Skin:
     """Separate skins as one."""
     starts = np.cumsum([0, *(len(p) for p, _ in skins)])
