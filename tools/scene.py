@@ -1,8 +1,8 @@
-"""What a hand does to the things of the scene: which one is meant, hidden or shown."""
+"""Which thing of the scene is meant, and how the view shows it; edits are in document_edits."""
 
 from __future__ import annotations
 
-from core.document import Document, MeshObject, find_groom, find_mesh, with_mesh
+from core.document import Document, MeshObject, find_groom, find_mesh
 from core.workspace import Workspace
 
 
@@ -13,12 +13,6 @@ def active_mesh(document: Document, workspace: Workspace) -> MeshObject | None:
     if document.grooms:
         return find_mesh(document, document.grooms[0].mesh_id)
     return document.meshes[0] if document.meshes else None
-
-
-def hide_mesh(document: Document, mesh_id: int) -> Document:
-    """The document with that mesh hidden, and with it the grooms that grow on it; UserError when there is none."""
-    item = find_mesh(document, mesh_id)
-    return document if item.hidden else with_mesh(document, item.replace(hidden=True))
 
 
 def show_all(document: Document) -> Document:

@@ -62,11 +62,11 @@ FILE: tuple[Command, ...] = (
     Command(
         "file.import_mesh", "Import mesh…",
         "Adds an animal or any mesh (OBJ, PLY, glTF, STL, USD, Alembic) to the document.",
-        lambda w: w.import_mesh(), "core.formats.mesh_file.read_mesh", "document", undo="Import mesh",
+        lambda w: w.import_mesh(), "tools.document_edits.import_mesh", "document", undo="Import mesh",
         icon="import", words="load model animal geometry add"),
     Command(
         "file.reload_mesh", "Reload mesh", "Reads the mesh file again and moves the groom onto its new shape.",
-        lambda w: w.reload_mesh(), "core.mesh.rebind.rebind_roots", "document", undo="Reload mesh",
+        lambda w: w.reload_mesh(), "tools.document_edits.reload_mesh", "document", undo="Reload mesh",
         enabled=_needs_mesh, icon="reload", words="update refresh geometry changed"),
     Command(
         "file.export_coat", "Export coat…", "Writes guides and hairs to USD, Alembic or .hair for a renderer.",

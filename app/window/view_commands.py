@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.window.commands import Command, Window, is_on, switch
-from tools.scene import active_mesh, ghosted, hide_mesh, isolated, show_all, stored_bookmark
+from tools.document_edits import set_mesh_hidden
+from tools.scene import active_mesh, ghosted, isolated, show_all, stored_bookmark
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
@@ -100,7 +101,7 @@ def _is_ghosted(desk: Desk) -> bool:
 def _hide(window: Window) -> None:
     mesh = active_mesh(window.desk.session.document, window.desk.session.workspace)
     if mesh is not None:
-        window.desk.edit("Hide", hide_mesh, mesh.id)
+        window.desk.edit("Hide", set_mesh_hidden, mesh.id, True)
 
 
 def _unhide(window: Window) -> None:
@@ -201,8 +202,8 @@ VIEW: tuple[Command, ...] = (
         icon="ghost", words="xray x-ray transparent"),
     Command(
         "view.hide", "Hide", "Hides the active mesh and its grooms, in the project too.",
-        _hide, "tools.scene.hide_mesh", "document", undo="Hide", enabled=_needs_something, scope="viewport",
-        icon="hide", words="invisible"),
+        _hide, "tools.document_edits.set_mesh_hidden", "document", undo="Hide", enabled=_needs_something,
+        scope="viewport", icon="hide", words="invisible"),
     Command(
         "view.unhide_all", "Show all", "Shows every hidden, isolated or ghosted mesh the way it was.",
         _unhide, "tools.scene.show_all", "document", undo="Show all", enabled=_needs_hidden, scope="viewport",

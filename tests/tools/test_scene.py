@@ -4,10 +4,10 @@ import pytest
 
 from core.camera import Camera, look_at
 from core.document import Document, MeshObject, with_groom, with_mesh
-from core.errors import UserError
 from core.workspace import Workspace
 from tests.documents import grid_mesh, small_document
-from tools.scene import active_mesh, ghosted, hide_mesh, isolated, show_all, stored_bookmark
+from tools.document_edits import set_mesh_hidden
+from tools.scene import active_mesh, ghosted, isolated, show_all, stored_bookmark
 
 
 def two_meshes() -> Document:
@@ -29,16 +29,13 @@ def test_without_grooms_it_is_the_first_mesh() -> None:
     assert active_mesh(Document(), Workspace()) is None
 
 
-def test_hiding_and_showing() -> None:
+def test_all_that_is_hidden_is_shown() -> None:
     document = two_meshes()
-    hidden = hide_mesh(document, 9)
-    assert [m.hidden for m in hidden.meshes] == [False, True]
-    assert hidden.meshes[0] is document.meshes[0]
-    assert hide_mesh(hidden, 9) is hidden
-    assert [m.hidden for m in show_all(hidden).meshes] == [False, False]
+    hidden = set_mesh_hidden(document, 9, True)
+    shown = show_all(hidden)
+    assert [m.hidden for m in shown.meshes] == [False, False]
+    assert shown.meshes[0] is document.meshes[0]
     assert show_all(document) is document
-    with pytest.raises(UserError, match="no mesh 5"):
-        hide_mesh(document, 5)
 
 
 def test_isolating_and_ghosting_go_and_come_back() -> None:
