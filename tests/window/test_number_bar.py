@@ -254,7 +254,8 @@ def test_whole_numbers_stay_whole(qtbot: QtBot) -> None:
 
 def test_the_menu_resets_copies_and_pastes(qtbot: QtBot) -> None:
     bench, bar = number(qtbot, LENGTH, 0.04, default=0.025, unit="cm")
-    actions = {action.text(): action for action in bar.menu().actions()}
+    menu = bar.menu()
+    actions = {action.text(): action for action in menu.actions()}
     actions["Copy"].trigger()
     assert QGuiApplication.clipboard().text() == "4 cm"
     actions["Reset to 2.5 cm"].trigger()
@@ -267,7 +268,8 @@ def test_the_menu_resets_copies_and_pastes(qtbot: QtBot) -> None:
     assert bar.value() == pytest.approx(0.0254)
     assert "Key here" not in actions
     bar.animatable = True
-    assert "Key here" in [action.text() for action in bar.menu().actions()]
+    menu = bar.menu()
+    assert "Key here" in [action.text() for action in menu.actions()]
     assert [final for _, final in bench.said] == [True, True]
 
 

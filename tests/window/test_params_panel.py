@@ -310,7 +310,8 @@ def test_a_low_shelf_has_a_menu_of_the_others(qtbot: QtBot, desk: Desk) -> None:
     bottom = max(b.geometry().bottom() for b in (*shelf.buttons.values(), shelf.more) if b.isVisible())
     assert bottom < shelf.height()
     label = desk.session.tools.tools[hidden[-1]].label
-    next(action for action in shelf.menu().actions() if action.text() == label).trigger()
+    menu = shelf.menu()
+    next(action for action in menu.actions() if action.text() == label).trigger()
     assert desk.session.tool.name == hidden[-1]
     assert shelf.buttons[hidden[-1]].isVisible()
     shelf.resize(shelf.width(), 2000)

@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.window.curve_editor import CurveEditor
@@ -153,7 +153,8 @@ def test_an_expression_given_up_before_it_was_one_leaves_the_number(qtbot: QtBot
 def test_maps_are_chosen_from_the_menu_and_a_missing_one_is_seen(qtbot: QtBot) -> None:
     widget, _ = shown(qtbot, constant(0.5))
     assert not widget.map.isVisible()
-    maps = next(action.menu() for action in widget.menu().actions() if action.text() == "Multiply by map")
+    menu = widget.menu()
+    (maps,) = (each for each in menu.findChildren(QMenu) if each.title() == "Multiply by map")
     next(action for action in maps.actions() if action.text() == "ears").trigger()
     assert widget.value().map == "ears"
     assert widget.map.isVisible()
@@ -167,7 +168,8 @@ def test_maps_are_chosen_from_the_menu_and_a_missing_one_is_seen(qtbot: QtBot) -
 
 def test_reset_brings_the_default_back(qtbot: QtBot) -> None:
     widget, told = shown(qtbot, formula("rand(id)", "stripe"))
-    next(action for action in widget.menu().actions() if action.text() == "Reset").trigger()
+    menu = widget.menu()
+    next(action for action in menu.actions() if action.text() == "Reset").trigger()
     assert isinstance(widget.value().base, Constant)
     assert (widget.value().base.number, widget.value().map) == (0.0, None)
     assert len(told.finals) == 1
