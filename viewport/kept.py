@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
+from core.record import Record
+
 
 def matched(kept: Sequence[Any], wanted: Sequence[Any], make: Callable[[Any], Any]) -> list[Any]:
     """Drawables for the wanted things: one with just these arrays, else one that can take them, else a new one.
@@ -28,10 +32,18 @@ def matched(kept: Sequence[Any], wanted: Sequence[Any], make: Callable[[Any], An
 
 
 def same(a: Any, b: Any) -> bool:
-    """True when two values hold the very same arrays and equal numbers; tuples are looked into."""
+    """True when two values hold the very same arrays and equal numbers; tuples and records are looked into.
+
+    Matrices, of up to 16 numbers, are compared by their numbers.
+    """
     if a is b:
         return True
-    if isinstance(a, tuple) and isinstance(b, tuple):
-        return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
-    plain = (bool, int, float, str, type(None))
-    return isinstance(a, plain) and isinstance(b, plain) and a == b
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, Record):
+        return all(same(getattr(a, name), getattr(b, name)) for name in a.__struct_fields__)
+    if isinstance(a, np.ndarray):
+        return a.size <= 16 and np.array_equal(a, b)
+    return bool(a == b)

@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 import moderngl
 import numpy as np
 
-from core.camera import Camera, pixel_scale, view_from_world
+from core.camera import Camera, view_from_world
 from core.workspace import ViewOptions
 from viewport.drawables.guides import GuideDrawable
 from viewport.drawables.strands import CoatDrawable
 from viewport.kept import matched, same
 from viewport.light_maps import LightMaps
-from viewport.near_side import WIDER, near_guides, sparse_coat, sparse_points
+from viewport.near_side import near_guides, sparse_coat, sparse_points, stands_for
 from viewport.renderer import Renderer, camera_uniforms, light_directions, light_uniforms
 from viewport.ribbons import far_to_near
-from viewport.scene import Coat, GuideLines, Scene
+from viewport.scene import Coat, GuideLines, Scene, mean_width
 
 MOST_ACROSS = 6.0  # strands of a wide ribbon
 MAP_SIDE = 256  # of the light's maps that are drawn anew whenever the light turns
@@ -35,6 +35,7 @@ class Moving:
         self.behind: tuple[moderngl.Texture, moderngl.Framebuffer] | None = None
         self._behind_key: tuple[Any, ...] | None = None
         self._across: dict[int, float] = {}
+        self._hairs = 0
         self._base_key: tuple[Any, ...] | None = None
         self._sparse_key: tuple[Any, ...] | None = None
         self._light_key: tuple[Any, ...] | None = None
@@ -80,9 +81,8 @@ class Moving:
     def _gather(self, scene: Scene, camera: Camera, size: tuple[int, int], hairs: int) -> None:
         key = (*scene.coats, *scene.guides, camera, size, hairs)
         if not same(self._sparse_key, key):
-            self._sparse_key, self._camera = key, camera
-            scale = pixel_scale(camera, size[1])
-            self._sparse = [(coat, sparse_coat(coat, camera, hairs, scale)) for coat in scene.coats]
+            self._sparse_key, self._camera, self._hairs = key, camera, hairs
+            self._sparse = [(coat, sparse_coat(coat, camera, hairs, size)) for coat in scene.coats]
             self._near = [(lines, near_guides(lines, camera)) for lines in scene.guides]
         ctx, renderer = self.ctx, self.renderer
         self.coats = matched(
@@ -107,8 +107,7 @@ class Moving:
                 _finish(coat.upload())
             shares = []
             for coat, drawn in self._sparse:
-                true = coat.look.root_width / max(drawn.look.root_width, 1e-12)  # fewer hairs by this to the power
-                shares.append(true ** (1.0 - 1.0 / WIDER))
+                shares.append(stands_for(coat, self._hairs) * mean_width(coat.look) / mean_width(drawn.look))
             drawables = self.renderer.solids.meshes
             self._lighting = _finish(self.light_maps.draw(scene, toward, drawables, self.coats, shares))
             self._light_key = key

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.camera import Camera
+from core.camera import Camera, pixel_scale
 from viewport.scene import Coat, GuideLines
 
 AWAY = -0.35  # cosine between skin and the way to the eye below which hair is hidden by what it grows on
 FEWEST_POINTS, MOST_POINTS = 4, 8  # of a hair while the hand moves
+MOST_COVER = 0.7  # of the picture, all hairs side by side: what filling them may cost
 BLUNT = 0.6  # of its root the least width of the tip of a ribbon that stands for several hairs
 PIXELS_A_PIECE = 7.0  # of a hair of usual length
 WIDER = 0.65  # exponent: fewer hairs are wider, between what keeps one hair's look and what keeps all of the cover
@@ -46,31 +47,41 @@ def prefix_rows(coat: Coat, hairs: int) -> NDArray[np.integer]:
     return np.arange(0, len(coat.points), -(-len(coat.points) // max(hairs, 1)) or 1, dtype=np.int32)
 
 
-def sparse_coat(coat: Coat, camera: Camera, hairs: int, scale: float) -> Coat:
+def stands_for(coat: Coat, hairs: int) -> float:
+    """How many hairs of the coat each of those taken by :func:`prefix_rows` stands for, at least 1."""
+    shown = len(coat.points) if coat.order is None else len(coat.order)
+    return max(shown / max(len(prefix_rows(coat, hairs)), 1), 1.0)
+
+
+def sparse_coat(coat: Coat, camera: Camera, hairs: int, size: tuple[int, int]) -> Coat:
     """The near side of an even part of a coat, gathered, with fewer points and wider hairs.
 
     hairs : how many of the coat are taken before those on the far side are left out.
-    scale : pixels as :func:`core.camera.pixel_scale` gives them; long hairs get more points.
+    size : of the picture, pixels; long hairs get more points, and all hairs together are not widened to cover more
+        than MOST_COVER of it.
     `order` of the result holds the rows of the coat that were taken.
     """
     rows = prefix_rows(coat, hairs)
-    shown = len(coat.points) if coat.order is None else len(coat.order)
-    wider = (shown / max(len(rows), 1)) ** WIDER
-    blunt = BLUNT if wider > 1.0 else 0.0
+    wider = stands_for(coat, hairs) ** WIDER
     roots = roots_of(coat.points)[rows]
     near = turned_to(camera, roots, coat.normals[rows])
     rows, roots = rows[near], roots[near]
-    root = coat.look.root_width * wider
-    look = coat.look._replace(root_width=root, tip_width=max(coat.look.tip_width * wider, blunt * root))
-    count = MOST_POINTS
+    look, count = coat.look, MOST_POINTS
     if len(rows):
         last = coat.points[rows, :, -1] if coat.points.shape[1] == 3 else coat.points[rows, -1]
         away = 1.0 if camera.orthographic else max(float(np.median((roots - camera.position) @ camera.forward)), 1e-9)
-        pixels = float(np.median(np.linalg.norm(last - roots, axis=1))) * scale / away
-        count = int(np.clip(np.ceil(pixels / PIXELS_A_PIECE) + 1, FEWEST_POINTS, MOST_POINTS))
+        scale = pixel_scale(camera, size[1]) / away
+        long = float(np.median(np.linalg.norm(last - roots, axis=1))) * scale
+        count = int(np.clip(np.ceil(long / PIXELS_A_PIECE) + 1, FEWEST_POINTS, MOST_POINTS))
+        most = MOST_COVER * size[0] * size[1] / max(len(rows) * long * look.root_width * scale, 1e-9)
+        wider = max(min(wider, most), 1.0)
+    root, tip = look.root_width * wider, look.tip_width * wider
+    if wider > 1.0:
+        tip = max(tip, BLUNT * root)
     return Coat(
-        fewer_points(coat.points, rows, count), np.asarray(coat.ids)[rows], coat.normals[rows], look,
-        None if coat.tints is None else coat.tints[rows], None if coat.widths is None else coat.widths[rows], rows,
+        fewer_points(coat.points, rows, count), np.asarray(coat.ids)[rows], coat.normals[rows],
+        look._replace(root_width=root, tip_width=tip), None if coat.tints is None else coat.tints[rows],
+        None if coat.widths is None else coat.widths[rows], rows,
     )
 
 

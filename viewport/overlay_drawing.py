@@ -20,6 +20,7 @@ TONES: Mapping[str, Byte3] = {
 }  # fmt: skip
 HALO = (0.04, 0.04, 0.045, 0.42)  # under every line, so that it is seen on light fur and on dark ground
 HALO_WIDTH = 1.0  # pixels on each side
+MARKER_WIDTH = 1.5
 DASH = (6.0, 5.0)
 AXIS_COLORS: tuple[Byte3, Byte3, Byte3] = ((0xDB, 0x62, 0x59), (0x86, 0xB0, 0x81), (0x62, 0x95, 0xD6))
 AXIS_LENGTH, AXIS_MARGIN = 26.0, 44.0  # pixels
@@ -43,7 +44,7 @@ def marks(overlays: Sequence[Overlay], tones: Mapping[str, Byte3] = TONES, scale
     for overlay in overlays:
         if isinstance(overlay, Label):
             continue
-        half = 0.5 * scale * (1.5 if isinstance(overlay, Marker) else overlay.width)
+        half = 0.5 * scale * (MARKER_WIDTH if isinstance(overlay, Marker) else overlay.width)
         color = [c / 255.0 for c in tones.get(overlay.tone, tones["plain"])] + [1.0]
         shapes = _shapes(overlay)
         rows += [[*s[:5], half + HALO_WIDTH * scale, s[5], 0.0, *HALO] for s in shapes]
@@ -57,7 +58,7 @@ def _shapes(overlay: Circle | Polyline | Marker) -> list[list[float]]:
         x, y = float(overlay.x), float(overlay.y)
         return [[x, y, x, y, max(float(overlay.radius), 0.0), -1.0]]
     if isinstance(overlay, Marker):
-        x, y, r = float(overlay.x), float(overlay.y), 0.5 * overlay.size
+        x, y, r = float(overlay.x), float(overlay.y), 0.5 * (overlay.size - MARKER_WIDTH)  # its ends are round
         return [[x - r, y, x + r, y, 0.0, -1.0], [x, y - r, x, y + r, 0.0, -1.0]]
     points = np.asarray(overlay.points, np.float64).reshape(-1, 2)
     if overlay.closed and len(points) > 2:

@@ -25,7 +25,7 @@ PLAIN = ViewOptions(grid=False, axes=False)
 
 def fur_color(look: Look) -> Color:
     """What skin under few hairs is painted in while the hand moves: as the whole coat looks from afar."""
-    r, g, b = (0.62 * root + 0.38 * tip for root, tip in zip(look.root, look.tip, strict=True))
+    r, g, b = (0.75 * root + 0.6 * tip for root, tip in zip(look.root, look.tip, strict=True))
     return (r, g, b)
 
 

@@ -15,7 +15,7 @@ void main()
     float covered = clamp(shape.y + 0.5 - away, 0.0, min(1.0, 2.0 * shape.y));
     if (shape.z >= 0.0) {
         float along = mod(shape.z + part * sqrt(length2), dash.x + dash.y);
-        covered *= clamp(min(along, dash.x - along) + 1.0, 0.0, 1.0);
+        covered *= clamp(min(along, dash.x - along) + 0.5, 0.0, 1.0);
     }
     if (covered <= 0.0) discard;
     out_color = vec4(color.rgb, 1.0) * (color.a * covered);

@@ -2,7 +2,7 @@
 uniform vec3 surface_color;
 uniform float absorption;
 uniform float covered;   // 1 under a coat, where little light of the sky arrives
-uniform bool stands_for_hair;   // of a moving picture, under a sparse coat: dim where the whole coat is deep
+uniform bool stands_for_hair;   // of a moving picture, under a sparse coat: as the coat looks between its hairs
 uniform int manner;      // 0 in light, 1 clay (lit by the view alone), 2 flat
 uniform bool show_map;
 uniform sampler2D ramp;
@@ -23,9 +23,9 @@ vec3 in_light(vec3 position, vec3 n, vec3 v, vec3 color)
 {
     vec2 key = key_light(position);
     float facing = max(dot(n, key_direction), 0.0);
-    vec3 light = key_color * key.x * exp(-key.y * absorption) * facing * 0.32;
-    float dim = 1.0 - 0.7 * covered;
-    if (stands_for_hair) dim = mix(1.0, 0.2, 1.0 - exp(-0.5 * key.y));
+    float through = stands_for_hair ? 0.62 : exp(-key.y * absorption);
+    vec3 light = key_color * key.x * through * facing * 0.32;
+    float dim = stands_for_hair ? 0.6 : 1.0 - 0.7 * covered;
     light += fill_color * clamp((dot(n, fill_direction) + 0.3) / 1.3, 0.0, 1.0) * 0.45 * dim;
     light += mix(ground_color, sky_color, 0.5 + 0.5 * dot(n, up_direction)) * 0.5 * dim;
     vec3 h = normalize(key_direction + v);

@@ -45,7 +45,7 @@ void main()
     if (strand >= strand_count) discard;
     int last = points_per_strand - 1;
     float u = float(point) / float(last);
-    float up = sparse ? 1.0 - (1.0 - u) * (1.0 - u) : u;   // of a sparse coat parts are seen that others would hide
+    float up = sparse ? 1.0 - (1.0 - u) * (1.0 - u) * (1.0 - u) : u;   // of a sparse coat parts are seen that others would hide
     vec3 p = strand_point(strand, point);
     vec3 before = point > 0 ? strand_point(strand, point - 1) : p;
     vec3 after = point < last ? strand_point(strand, point + 1) : p;
@@ -61,7 +61,7 @@ void main()
     float length2 = dot(line, line);
     vec2 side = length2 > 1e-12 ? vec2(-line.y, line.x) * inversesqrt(length2) : vec2(1.0, 0.0);
     float width = mix(widths.x, widths.y, u * u) * tint.a;
-    if (sparse) width = min(width, 0.3 * distance(strand_point(strand, 0), strand_point(strand, last)));
+    if (sparse) width = min(width, 0.42 * distance(strand_point(strand, 0), strand_point(strand, last)));
     out_side = vec4(side, min(0.5 * width * pixels_at_one / max(clip.w, 1e-6), 4096.0), 1.0);   // w <= 0 behind the eye
 
     // colour of the fibre: dark root to light tip
@@ -74,6 +74,7 @@ void main()
     vec2 key = key_light(p);
     // deep hair is lit by light that other hairs scattered: the lighter the hair, the farther it gets, and the warmer
     vec3 swallowed = absorption * (1.0 - 0.55 * sqrt(clamp(body, 0.0, 1.0)));
+    if (sparse) swallowed *= 0.6;
     vec3 through = key.x * exp(-key.y * swallowed);
     float openness = mix(0.22, 1.0, smoothstep(0.0, 0.85, up));
 
