@@ -10,8 +10,18 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from PySide6.QtCore import QPoint, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QLineF, QPoint, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import (
+    QGuiApplication,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPainterPathStroker,
+    QPaintEvent,
+    QPen,
+    QRegion,
+)
 from PySide6.QtWidgets import QWidget
 
 from app.window.icons import paint_icon
@@ -75,6 +85,7 @@ class RadialMenu(QWidget):
         y = min(max(place.y() - self.height() // 2, free.top()), free.bottom() - self.height() + 1)
         self.move(x, y)
         self._hand, self._pressed = self._middle(), QPointF(place)
+        self._cut_out()
         self.show()
         self.activateWindow()
         self.setFocus()
@@ -95,6 +106,7 @@ class RadialMenu(QWidget):
             self._hand = QPointF(self.mapFromGlobal(place_on_screen))
         else:
             self._hand = self._middle() + QPointF(place_on_screen) - self._pressed
+        self._cut_out()
         self.update()
 
     def let_go(self) -> None:
@@ -131,24 +143,58 @@ class RadialMenu(QWidget):
         painter, theme = QPainter(self), look_of().theme
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, under = self._middle(), self.entry_at(self._hand)
-        way = self._hand - middle
-        length = math.hypot(way.x(), way.y())
         painter.setPen(QPen(theme.colour("line"), 6.0 * self._size))
         painter.drawEllipse(middle, DEAD * self._size, DEAD * self._size)
-        if length > DEAD * self._size:
+        line = self._line()
+        if line is not None:
             painter.setPen(QPen(theme.colour("accent"), 2.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-            reach = min(length, (RADIUS - 24.0) * self._size) / length
-            painter.drawLine(middle + way * (DEAD * self._size / length), middle + way * reach)
+            painter.drawLine(line)
         for i, entry in enumerate(self._entries):
             if entry is not None:
                 self._draw(painter, self._place(i), entry, theme, entry is under and entry.reason is None)
         painter.end()
 
+    def _icon_room(self, entry: Entry) -> float:
+        return 0.0 if entry.icon is None else 20.0 * self._size
+
+    def _box(self, place: QPointF, entry: Entry) -> QRectF:
+        metrics = self.fontMetrics()
+        width = metrics.horizontalAdvance(entry.label) + self._icon_room(entry) + 20.0
+        height = metrics.height() + 12.0
+        return QRectF(place.x() - width / 2, place.y() - height / 2, width, height)
+
+    def _line(self) -> QLineF | None:
+        """From the ring towards the hand, not under the entries; None while the hand is in the middle."""
+        middle, way = self._middle(), self._hand - self._middle()
+        length = math.hypot(way.x(), way.y())
+        if length <= DEAD * self._size:
+            return None
+        reach = min(length, (RADIUS - 24.0) * self._size) / length
+        return QLineF(middle + way * (DEAD * self._size / length), middle + way * reach)
+
+    def _cut_out(self) -> None:
+        """Be a window only where something is drawn: without a compositor the rest would be black."""
+        ring = (DEAD + 4.0) * self._size
+        region = QRegion(
+            QRectF(self._middle().x() - ring, self._middle().y() - ring, 2 * ring, 2 * ring).toAlignedRect(),
+            QRegion.RegionType.Ellipse)
+        for i, entry in enumerate(self._entries):
+            if entry is not None:
+                path = QPainterPath()
+                path.addRoundedRect(self._box(self._place(i), entry).adjusted(-1.0, -1.0, 1.0, 1.0), 6.0, 6.0)
+                region += QRegion(path.toFillPolygon().toPolygon())
+        line = self._line()
+        if line is not None:
+            path = QPainterPath(line.p1())
+            path.lineTo(line.p2())
+            pen = QPainterPathStroker()
+            pen.setWidth(4.0)
+            region += QRegion(pen.createStroke(path).toFillPolygon().toPolygon())
+        self.setMask(region)
+
     def _draw(self, painter: QPainter, place: QPointF, entry: Entry, theme: Theme, chosen: bool) -> None:
-        metrics, icon = self.fontMetrics(), 0.0 if entry.icon is None else 20.0 * self._size
+        icon, box = self._icon_room(entry), self._box(place, entry)
         words = theme.colour("accent" if chosen else "dim" if entry.reason else "text")
-        width, height = metrics.horizontalAdvance(entry.label) + icon + 20.0, metrics.height() + 12.0
-        box = QRectF(place.x() - width / 2, place.y() - height / 2, width, height)
         painter.setPen(QPen(theme.colour("accent" if chosen else "line"), 1.0))
         painter.setBrush(theme.colour("accent_ground" if chosen else "panel"))
         painter.drawRoundedRect(box, 5.0, 5.0)
