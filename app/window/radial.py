@@ -144,6 +144,7 @@ class RadialMenu(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, under = self._middle(), self.entry_at(self._hand)
         painter.setPen(QPen(theme.colour("line"), 6.0 * self._size))
+        painter.setBrush(theme.colour("panel"))
         painter.drawEllipse(middle, DEAD * self._size, DEAD * self._size)
         line = self._line()
         if line is not None:
