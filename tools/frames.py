@@ -1,37 +1,11 @@
-"""The timeline of a document: its range and rate, and which frames are keyed."""
+"""What a timeline shows of a document: which frames are keyed, and how far clips reach."""
 
 from __future__ import annotations
 
 from core.curve import Curve
-from core.document import FRAMES, RATES, Document
-from core.errors import UserError
+from core.document import Document
 from core.groom.groom import COAT_VALUES
 from core.posed import moves
-
-
-def with_range(document: Document, first: int, last: int) -> Document:
-    """The document with another first and last frame; of two that are crossed the smaller one is the first.
-
-    Raises
-    ------
-    UserError
-        Frames no timeline can have.
-    """
-    first, last = sorted((first, last))
-    if not FRAMES[0] <= first <= last <= FRAMES[1]:
-        raise UserError(f"Frames go from {FRAMES[0]:,} to {FRAMES[1]:,}; give others.")
-    if (first, last) == (document.first_frame, document.last_frame):
-        return document
-    result: Document = document.replace(first_frame=first, last_frame=last)
-    return result
-
-
-def with_rate(document: Document, fps: float) -> Document:
-    """The document played at so many frames per second; UserError for a rate nothing plays at."""
-    if not RATES[0] <= fps <= RATES[1]:
-        raise UserError(f"A rate goes from {RATES[0]:g} to {RATES[1]:,.0f} frames per second; give another.")
-    result: Document = document if fps == document.fps else document.replace(fps=float(fps))
-    return result
 
 
 def keyed_frames(document: Document) -> tuple[float, ...]:

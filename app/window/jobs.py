@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
+from shiboken6 import isValid
 
 from app.window.theme import look_of
 from core.errors import UserError
@@ -40,8 +41,11 @@ class Job:
     name : what it does, for a person. fraction : done of it, 0 .. 1, or -1 while nobody knows. stop : set to cancel it.
     """
 
-    def __init__(self, name: str, done: Callable[[Any], None], failed: Callable[[Exception], None] | None) -> None:
-        self.name, self.done, self.failed = name, done, failed
+    def __init__(
+        self, name: str, done: Callable[[Any], None], failed: Callable[[Exception], None] | None,
+        owner: QObject | None = None,
+    ) -> None:
+        self.name, self.done, self.failed, self.owner = name, done, failed, owner
         self.fraction = -1.0
         self.started = time.monotonic()
         self.stop = threading.Event()
@@ -86,6 +90,7 @@ class Jobs(QObject):
         function: Callable[[Progress, Asked], Any],
         done: Callable[[Any], None],
         failed: Callable[[Exception], None] | None = None,
+        owner: QObject | None = None,
     ) -> Job:
         """Run ``function(progress, cancelled)`` on a thread of its own.
 
@@ -96,8 +101,9 @@ class Jobs(QObject):
             :class:`Cancelled` when it was cancelled; ``cancelled()`` only tells.
         done : gets the result on the thread of the window; not called for what was cancelled.
         failed : gets the exception instead, a :class:`Cancelled` too. Without it the desk says what went wrong.
+        owner : nothing is delivered any more when this widget is gone.
         """
-        job = Job(name, done, failed)
+        job = Job(name, done, failed, owner)
         if self._closed:
             return job
         job.thread = threading.Thread(target=self._work, args=(job, function), name=f"job {name}", daemon=True)
@@ -216,6 +222,8 @@ class Jobs(QObject):
         self._jobs.remove(job)
         if job.thread is not None:
             job.thread.join()  # it has nothing left to do
+        if job.owner is not None and not isValid(job.owner):
+            return
         if what == "done" and not job.stopping:
             self._desk.attempt(job.done, value)
             return

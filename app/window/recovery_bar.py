@@ -62,7 +62,7 @@ class RecoveryBar(NoticeBar):
     def look(self) -> None:
         """Look for work to recover beside the window, and show it."""
         self._desk.jobs.start("Look for lost work", lambda progress, cancelled: find_lost(self._folder, progress),
-                              self._found, lambda error: None)
+                              self._found, lambda error: None, self)
 
     def recover(self) -> None:
         """Open what is offered first."""
@@ -110,7 +110,7 @@ class RecoveryBar(NoticeBar):
             return
         first, others = self._lost[0], len(self._lost) - 1
         last = f", last step “{first.step}”" if first.step else ""
-        more = f" There is work of {others} more." if others else ""
+        more = f" {others} more after this." if others else ""
         self.tell(f"Unsaved work on {_title(first)} was found: {_when(first.time)}{last}.{more}")
 
 

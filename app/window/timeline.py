@@ -15,7 +15,8 @@ from app.window.playback import Playback
 from app.window.theme import Look, look_of, text_font
 from core.document import Document
 from core.workspace import Workspace
-from tools.frames import clip_range, keyed_frames, with_range, with_rate
+from tools.document_edits import set_document
+from tools.frames import clip_range, keyed_frames
 
 STEPS = (1, 2, 5)  # times a power of ten: frames between two numbers of the ruler
 WHEEL = 120  # an eighth of a degree each: one notch
@@ -250,7 +251,7 @@ class Timeline(QWidget):
         self.last = NumberField("The last frame of the timeline; type another to change the range.",
                                 lambda f: self._edit_range(self._desk.document.first_frame, f))
         self.rate = NumberField("Frames per second of the project; type another to play faster or slower.",
-                                lambda fps: self._desk.edit("Frame rate", with_rate, fps), 5)
+                                lambda fps: self._desk.edit("Frame rate", set_document, fps=fps), 5)
         self._unit, self._dash = QLabel("fps"), QLabel("–")
         self.first_button = self._button("first", "Goes to the first frame of the timeline.",
                                          lambda: self._go(self._desk.document.first_frame))
@@ -322,7 +323,8 @@ class Timeline(QWidget):
             self._go(frame)
 
     def _edit_range(self, first: float, last: float) -> None:
-        self._desk.edit("Frame range", with_range, round(first), round(last))
+        first, last = sorted((round(first), round(last)))
+        self._desk.edit("Frame range", set_document, first_frame=first, last_frame=last)
 
 
 def _step(frames: int, most: int) -> int:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QCoreApplication, Qt, QThread
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThread
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.window.desk import Desk
@@ -147,6 +148,18 @@ def test_a_job_asks_the_window_and_waits(desk: Desk, qtbot: QtBot) -> None:
     box.append(desk.jobs.start("Ask", lambda p, c: (time.sleep(0.02), work(p, c))[1], answers.append))
     qtbot.waitUntil(lambda: bool(answers))
     assert answers == [[True, 4, "No."]]
+
+
+def test_nothing_is_delivered_to_a_widget_that_is_gone(desk: Desk, qtbot: QtBot) -> None:
+    widget = QWidget()
+    begun = threading.Event()
+    desk.jobs.start("Look", lambda progress, cancelled: begun.wait(5.0), lambda result: pytest.fail("it is gone"),
+                    owner=widget)
+    widget.deleteLater()
+    del widget
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    begun.set()
+    qtbot.waitUntil(lambda: not desk.jobs.running)
 
 
 def test_closing_ends_every_job_even_one_that_waits_for_the_window(desk: Desk) -> None:
