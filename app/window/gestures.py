@@ -221,7 +221,8 @@ class Gestures:
 
     def takes(self, key: Qt.Key) -> bool:
         """True when this key belongs to what goes on here, whatever hotkey it is elsewhere."""
-        return bool(self.held) or isinstance(self.drag, BrushDrag) or (self.drag is not None and key == Qt.Key.Key_Escape)
+        dragging = self.drag is not None and key == Qt.Key.Key_Escape
+        return dragging or bool(self.held) or isinstance(self.drag, BrushDrag)
 
     def key(self, key: Qt.Key, text: str, modifiers: tuple[str, ...], pointer: Pointer, on_screen: QPoint) -> bool:
         """A key goes down over the viewport. True when it did something here."""

@@ -41,13 +41,16 @@ class Eye:
 
     @property
     def camera(self) -> Camera:
-        """The camera of the workspace; one that sees everything when it has none."""
+        """The camera of the workspace; when it has none, it is given one that sees everything."""
         cameras = self.desk.workspace.cameras
-        return cameras[0] if cameras else self.first_camera()
-
-    def first_camera(self) -> Camera:
-        """A three-quarter view of everything, from the front of the animal."""
-        return self._framed(self._direction("three-quarter"))
+        if cameras:
+            return cameras[0]
+        camera = frame_points(
+            self.points(), self._direction("three-quarter"), self._aspect(), field_of_view=LENS)
+        camera = navigate.with_clipping(camera, self.corners())
+        if self.desk.document.meshes:
+            self.desk.set_workspace(cameras=(camera,))
+        return camera
 
     def look(self, camera: Camera) -> None:
         """Look through a camera; near and far are put about what there is."""
@@ -161,10 +164,6 @@ class Eye:
         document, view = self.desk.document, navigate.SIDES[side]
         item = active_mesh(document, self.desk.workspace)
         return view if item is None else turned_view(view, skin_at(item, None, self.desk.session.evaluator))
-
-    def _framed(self, direction: tuple[float, float, float]) -> Camera:
-        camera = frame_points(self.points(), direction, self._aspect(), field_of_view=LENS)
-        return navigate.with_clipping(camera, self.corners())
 
 
 class CameraDrag:

@@ -255,7 +255,8 @@ class Viewport(QOpenGLWindow):
         self.redraw()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
-        if old.frame != new.frame or old.view is not new.view or old.groom != new.groom or old.cameras is not new.cameras:
+        seen = ("frame", "view", "groom", "cameras")
+        if any(getattr(old, name) is not getattr(new, name) for name in seen):
             self.redraw()
         else:
             self._hud = (0.0, [])
