@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from core.camera import clip_from_world
-from core.document import Document, find_groom, find_mesh, with_groom
+from core.document import Document, find_mesh, with_groom
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.groom.guides import Guides
@@ -202,9 +202,7 @@ class Hand:
         """What strokes would work on, one for each side of symmetry; the same objects while nothing changed."""
         session, workspace = self.session, self.session.workspace
         document = session.history.current
-        if not document.grooms:
-            raise UserError("There is no groom to work on; open a mesh and add a groom to it first.")
-        groom = document.grooms[0] if workspace.groom is None else find_groom(document, workspace.groom)
+        groom = session.groom
         item = find_mesh(document, groom.mesh_id)
         if item.locked:
             raise UserError(f"{item.name} is locked; unlock it in the scene panel to edit its hair.")

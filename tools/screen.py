@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from core.falloff import Shape, falloff
 from core.groom.guides import Guides
 from core.groom.region import View, distance_to_path, facing
+from core.groom.rows import take_rows
 from core.rows import changed_rows
+from tools.respect import rows_of
 
 FAR = 1e9  # pixels, where points behind the eye are put
 FLAT = 0.25  # of the radius, of the falloff "flat"
@@ -41,10 +43,18 @@ class Screen:
         """Find the strands of `guides` that moved, came or went since."""
         if guides.points is self._points:
             return
-        if guides.points.shape != self._points.shape or not np.array_equal(guides.ids, self.ids):
+        if guides.points.shape[1] != self._points.shape[1] or len(self.ids) == 0:
             self._put(guides)
             return
-        rows = changed_rows(self._points, guides.points)
+        new = np.empty(0, np.int64)
+        if not np.array_equal(guides.ids, self.ids):
+            there, row = rows_of(self.ids, guides.ids)
+            self.ids, self._points = guides.ids, self._points[row]
+            self.pixels, self.low, self.high = self.pixels[row], self.low[row], self.high[row]
+            self.seen = self.seen[row]
+            new = np.flatnonzero(~there)
+            self.seen[new] = facing(take_rows(guides, new), self.view)
+        rows = np.union1d(new, changed_rows(self._points, guides.points))
         self.pixels[rows] = self._project(guides.points[rows])
         self.low[rows], self.high[rows] = self.pixels[rows].min(axis=1), self.pixels[rows].max(axis=1)
         self._points = guides.points

@@ -7,16 +7,19 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from core.document import Document
+from core.document import Document, find_groom
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats.arrays import ArrayHashes
 from core.formats.journal import Journal, remove_journal, state_folder
 from core.formats.project import read_project, write_project
 from core.formats.recovery import abandoned, recover, recover_newest
+from core.groom.groom import Groom
 from core.history import DEFAULT_BUDGET, History
 from core.workspace import Workspace
+from tools.groom.actions import ACTIONS, act
 from tools.hand import Hand
+from tools.macro import Macro
 from tools.registry import Registry
 from tools.tool import Tool
 
@@ -30,7 +33,7 @@ class Session:
     document : the value shown, which during a stroke is a preview.
     workspace : frame, cameras, panels, tool; change it with :meth:`set_workspace`, undo leaves it alone.
     changed : called with the old and the new value after every change of `document`; the one listener there is.
-    tools : the tools there are. hand : makes their strokes.
+    tools : the tools there are. hand : makes their strokes. recording : the macro that is recorded, or None.
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class Session:
         self._journal = journal
         self.tools = tools if tools is not None else Registry()
         self.hand = Hand(self)
+        self.recording: Macro | None = None
         self._tool: tuple[str, Any, Tool[Any]] | None = None
 
     @classmethod
@@ -125,6 +129,14 @@ class Session:
         name = next(name for name in (self.workspace.tool, FIRST_TOOL, *self.tools.tools) if name in self.tools)
         return self.tool_named(name)
 
+    @property
+    def groom(self) -> Groom:
+        """The groom that tools and actions edit; UserError when there is none."""
+        document, wanted = self.history.current, self.workspace.groom
+        if not document.grooms:
+            raise UserError("There is no groom to work on; open a mesh and add a groom to it first.")
+        return document.grooms[0] if wanted is None else find_groom(document, wanted)
+
     def tool_named(self, name: str) -> Tool[Any]:
         """A tool with the parameters the workspace has for it."""
         params = self.workspace.params.get(name)
@@ -179,7 +191,30 @@ class Session:
         """
         self.hand.cancel()
         self.cancel()
-        self.commit(name, function(self.history.current, *args, **parameters))
+        before = self.history.current
+        self.commit(name, function(before, *args, **parameters))
+        if self.recording is not None and self.history.current is not before:
+            self.recording.edited(name, function, args, parameters)
+
+    def act(self, name: str, **params: Any) -> None:
+        """Do an action of :data:`tools.groom.actions.ACTIONS` to the active groom, as one named step.
+
+        Raises
+        ------
+        UserError
+            There is no such action or no groom, its mesh is locked, or there is nothing to do it to.
+        """
+        if name not in ACTIONS:
+            raise UserError(f"There is no action named {name!r}; choose one of {', '.join(ACTIONS)}.")
+        action = ACTIONS[name]
+        record = action.make(params)
+        self.hand.cancel()
+        self.cancel()
+        document, respect, groom = self.history.current, self.workspace.respect, self.groom
+        done = act(document, groom, action, record, respect, self.evaluator)
+        self.commit(action.step, done)
+        if done is not document and self.recording is not None:
+            self.recording.acted(name, params, groom.id, respect)
 
     def undo(self) -> None:
         """Go back one step (a preview is given up first)."""
@@ -210,6 +245,17 @@ class Session:
         self.path, self._saved = target, self.history.current
         self._write_journal("Save")
 
+    def record(self) -> Macro:
+        """Begin a macro: strokes, actions and edits from now on, until :meth:`stop_recording`. An earlier one ends."""
+        self.recording = Macro()
+        self.hand.recorded = self.recording.stroked
+        return self.recording
+
+    def stop_recording(self) -> Macro | None:
+        """End the macro that is recorded and return it; None when there is none."""
+        ended, self.recording, self.hand.recorded = self.recording, None, None
+        return ended
+
     def close(self, discard: bool = False) -> None:
         """End the session. Unsaved work stays recoverable unless `discard`."""
         if self._journal is not None:
@@ -219,8 +265,10 @@ class Session:
 
     def _go(self, move: Callable[[], Document], name: str) -> None:
         self.hand.cancel()
-        before = self.history.current
+        before, place = self.history.current, self.history.cursor
         document = move()
+        if self.recording is not None:
+            self.recording.moved(self.history.cursor - place)
         if document is not before:
             self._write_journal(name)
         self._show(document)

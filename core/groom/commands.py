@@ -38,6 +38,7 @@ from core.groom.select import (
     select_with_ring,
 )
 from core.groom.smooth import smooth
+from core.groom.straighten import straighten
 from core.mesh.distance_field import DistanceField
 from core.mesh.mesh import Mesh
 from core.mesh.skin import Skin, distance_field, skin_at_rest
@@ -171,6 +172,7 @@ _TABLE: tuple[tuple[str, str, Callable[[Guides, Draw], Guides]], ...] = (
     ("cut_at_line", "Cut at a line", _cut_line),
     ("cut_with_ring", "Cut", _cut_ring),
     ("smooth", "Smooth", lambda g, d: smooth(g, across=0.3, weights=d.weights(g), field=d.context.field)),
+    ("straighten", "Straighten", lambda g, d: straighten(g, float(d.rng.uniform(0.2, 1.0)), field=d.context.field)),
     ("clone", "Clone", _clone),
     ("spray", "Hairspray", _spray),
     ("wash", "Wash", lambda g, d: wash(g, float(d.rng.uniform(0.2, 1.2)), d.weights(g))),
