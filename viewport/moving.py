@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from core.camera import Camera, view_from_world
 from core.workspace import ViewOptions
+from viewport.display_target import DisplayTarget, display_target
 from viewport.drawables.guides import GuideDrawable
 from viewport.drawables.strands import CoatDrawable
 from viewport.kept import matched, same
 from viewport.light_maps import LightMaps
-from viewport.near_side import near_guides, sparse_coat, sparse_points, stands_for
+from viewport.near_side import (
+    grown_box,
+    near_guides,
+    roots_of,
+    rows_in_box,
+    shown_rows,
+    sparse_coat,
+    sparse_points,
+    stands_for,
+    turned_to,
+)
+from viewport.patch import Patch
 from viewport.renderer import Renderer, camera_uniforms, light_directions, light_uniforms
 from viewport.ribbons import far_to_near
 from viewport.scene import Coat, GuideLines, Scene, mean_width
@@ -40,49 +53,114 @@ class Moving:
         self._sparse_key: tuple[Any, ...] | None = None
         self._light_key: tuple[Any, ...] | None = None
         self._lighting: dict[str, Any] = {}
+        self._guides_key: tuple[Any, ...] | None = None
+        self.patch = Patch(ctx, renderer.ribbons)
+        self.touched: list[tuple[np.ndarray, np.ndarray]] = []  # arrays and their rows changed since the last picture
+        self._moved: list[NDArray[np.bool_]] = []  # since the finished picture, of every coat
+        self._guides_moved: list[NDArray[np.bool_]] = []
+        self._last_guides: list[GuideLines] = []
+        self._box = np.zeros(4)  # around all that moved since: left, top, right, bottom, pixels
         self._sparse: list[tuple[Coat, Coat]] = []  # in the scene, and what is drawn of it
         self._near: list[tuple[GuideLines, GuideLines]] = []
 
-    def rows_changed(self) -> None:
-        """Arrays of the scene were written to in place: gather again what is drawn of them."""
-        self._sparse = [(coat, sparse_points(coat, drawn)) for coat, drawn in self._sparse]
-        self._near = [(lines, near_guides(lines, self._camera)) for lines, _ in self._near]
+    def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
+        """Rows of an array of the scene were written to in place: gather again what is drawn of it."""
+        self._sparse = [(c, sparse_points(c, drawn) if c.points is points else drawn) for c, drawn in self._sparse]
+        self._near = [(g, near_guides(g, self._camera) if g.points is points else near) for g, near in self._near]
+        self.touched.append((points, rows))
 
     def draw(
         self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, size: tuple[int, int], options: ViewOptions,
-        hairs: int, finished: tuple[LightMaps, dict[str, Any]] | None,
+        hairs: int, finished: tuple[LightMaps, dict[str, Any]] | None = None,
+        picture: tuple[DisplayTarget, int] | None = None,
     ) -> int:
         """Draw the picture; how many hairs it shows.
 
         hairs : of each coat, before those on the far side are left out.
         finished : the light's maps of a finished picture in the same light, and the uniforms that describe them.
+        picture : the finished picture and its number, when since then only rows were changed: it stays elsewhere.
         """
         self._gather(scene, camera, size, hairs)
+        for drawable in (*self.coats, *self.guides):
+            _finish(drawable.upload())
         toward = light_directions(scene, camera)
         maps, lighting = finished if finished is not None else (self.light_maps, self._light(scene, toward["key"]))
         uniforms = camera_uniforms(scene, camera, size, to_display=True) | lighting | light_uniforms(scene, toward)
         self._draw_base(scene, camera, size, options, uniforms, maps)
         assert self.base is not None
-        self.ctx.copy_framebuffer(target, self.base.framebuffer)
         maps.bind()
-        view_row = -view_from_world(camera)[2]
         for drawable in (*self.coats, *self.guides):
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            _finish(drawable.upload())
-            shown = drawable.coat if isinstance(drawable, CoatDrawable) else drawable.lines
-            across = self._across.get(id(shown), 1.0)
-            _finish(drawable.work_out({**uniforms, "sparse": across > 1.0}))
-            order = _finish(far_to_near(shown.points, view_row))
-            points = np.arange(drawable.textures.per_strand)
+            _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0}))
+        behind, box = self.base, None
+        if picture is not None:
+            behind, box = self._patched(scene, camera, picture, uniforms["clip_from_world"]), self._box
+        self.touched = []
+        self.ctx.copy_framebuffer(target, behind.framebuffer)
+        view_row = -view_from_world(camera)[2]
+        for drawable in (*self.coats, *self.guides):
+            strands = _shown(drawable).points
+            rows = None if box is None else rows_in_box(strands, camera, size, box)
+            order = _finish(far_to_near(strands, view_row, rows=rows))
+            points, across = np.arange(drawable.textures.per_strand), self._strands_across(drawable)
             matrix = uniforms["clip_from_world"]
             _finish(self.renderer.ribbons.draw(drawable.textures, order, points, matrix, target, across=across))
         return sum(len(coat.points) for _, coat in self._sparse)
 
+    def _strands_across(self, drawable: CoatDrawable | GuideDrawable) -> float:
+        return self._across.get(id(_shown(drawable)), 1.0)
+
+    def _patched(
+        self, scene: Scene, camera: Camera, picture: tuple[DisplayTarget, int], matrix: np.ndarray
+    ) -> DisplayTarget:
+        """The finished picture with holes where hairs and guides have moved since, from and to."""
+        patch, renderer = self.patch, self.renderer
+        if patch.number != picture[1]:
+            patch.start(*picture)
+            self._moved = [np.zeros(len(coat.points), bool) for coat in scene.coats]
+            self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
+            self._last_guides = [drawable.lines for drawable in renderer.guides]
+            self._box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+        size = picture[0].color.size
+        assert self.base is not None
+        assert patch.target is not None
+        for i, (coat, drawn) in enumerate(self._sparse):
+            rows = [rows for points, rows in self.touched if points is coat.points]
+            if rows:
+                new = np.unique(np.concatenate(rows))
+                new = new[~self._moved[i][new]]
+                self._moved[i][new] = True
+                new = new[turned_to(camera, roots_of(coat.points)[new], coat.normals[new])]
+                patch.open(renderer.coats[i].textures, new, self.base, matrix)
+                self._box = grown_box(self._box, coat.points, new, camera, size)
+            assert drawn.order is not None
+            moved = np.flatnonzero(self._moved[i][drawn.order])
+            patch.open(self.coats[i].textures, moved, self.base, matrix)
+            self._box = grown_box(self._box, drawn.points, moved, camera, size)
+        for i, lines in enumerate(scene.guides):
+            rows = [rows for points, rows in self.touched if points is lines.points]
+            changed = changed_guides(self._last_guides[i], lines)
+            changed[np.concatenate([np.zeros(0, np.intp), *rows])] = True
+            near = shown_rows(lines, camera, near_only=True)
+            near = np.arange(len(lines.points)) if near is None else near
+            new = changed & ~self._guides_moved[i]
+            self._guides_moved[i] |= changed
+            patch.open(renderer.guides[i].textures, near[new[near]], self.base, matrix)
+            moved = np.flatnonzero(self._guides_moved[i][near])
+            patch.open(self.guides[i].textures, moved, self.base, matrix)
+            for strands, rows_of_box in ((self._last_guides[i].points, near[new[near]]), (lines.points, near[moved])):
+                self._box = grown_box(self._box, strands, rows_of_box, camera, size)
+        self._last_guides = list(scene.guides)
+        return patch.target
+
     def _gather(self, scene: Scene, camera: Camera, size: tuple[int, int], hairs: int) -> None:
-        key = (*scene.coats, *scene.guides, camera, size, hairs)
+        key = (*scene.coats, camera, size, hairs)
         if not same(self._sparse_key, key):
             self._sparse_key, self._camera, self._hairs = key, camera, hairs
             self._sparse = [(coat, sparse_coat(coat, camera, hairs, size)) for coat in scene.coats]
+        guides_key = (*scene.guides, camera)
+        if not same(self._guides_key, guides_key):
+            self._guides_key = guides_key
             self._near = [(lines, near_guides(lines, camera)) for lines in scene.guides]
         ctx, renderer = self.ctx, self.renderer
         self.coats = matched(
@@ -103,11 +181,10 @@ class Moving:
     def _light(self, scene: Scene, toward: np.ndarray) -> dict[str, Any]:
         key = (*scene.surfaces, self._sparse_key, tuple(toward.tolist()))
         if not same(self._light_key, key):
-            for coat in self.coats:
-                _finish(coat.upload())
             shares = []
             for coat, drawn in self._sparse:
-                shares.append(stands_for(coat, self._hairs) * mean_width(coat.look) / mean_width(drawn.look))
+                narrower = mean_width(coat.look) / max(mean_width(drawn.look), 1e-12)
+                shares.append(stands_for(coat, self._hairs) * narrower)
             drawables = self.renderer.solids.meshes
             self._lighting = _finish(self.light_maps.draw(scene, toward, drawables, self.coats, shares))
             self._light_key = key
@@ -119,8 +196,8 @@ class Moving:
     ) -> None:
         lit = self._light_key if maps is self.light_maps else id(maps)
         key = (
-            *scene.surfaces, bool(scene.coats), scene.background, scene.exposure, scene.lights, camera, size, options,
-            self.renderer.backdrop.image, lit,
+            *scene.surfaces, *(coat.look for coat in scene.coats), scene.background, scene.exposure, scene.lights,
+            camera, size, options, self.renderer.backdrop.image, lit,
         )
         if self.base is not None and same(self._base_key, key):
             return
@@ -165,31 +242,23 @@ class Moving:
         """Give back the memory; the context must be current."""
         self._release_base()
         self._release_behind()
-        for thing in (*self.coats, *self.guides, self.light_maps):
+        for thing in (*self.coats, *self.guides, self.light_maps, self.patch):
             thing.release()
         self.coats, self.guides = [], []
 
 
-class DisplayTarget(NamedTuple):
-    """Displayed colours with depth. `alone` is a framebuffer of the colours alone, to copy from where depth differs."""
-
-    color: moderngl.Texture
-    depth: moderngl.Renderbuffer
-    framebuffer: moderngl.Framebuffer
-    alone: moderngl.Framebuffer
-
-    def release(self) -> None:
-        """Give back the memory; the context must be current."""
-        for thing in (self.alone, self.framebuffer, self.depth, self.color):
-            thing.release()
+def changed_guides(before: GuideLines, now: GuideLines) -> NDArray[np.bool_]:
+    """(G,) True where the points or the state of a guide differ; both have the same number of guides."""
+    changed = np.zeros(len(now.points), bool)
+    if before.points is not now.points:
+        changed |= (before.points != now.points).any(axis=(1, 2))
+    if before.states is not now.states:
+        changed |= before.states != now.states
+    return changed
 
 
-def display_target(ctx: moderngl.Context, size: tuple[int, int]) -> DisplayTarget:
-    """A new target of this size in pixels."""
-    color = ctx.texture(size, 4)
-    color.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    depth = ctx.depth_renderbuffer(size)
-    return DisplayTarget(color, depth, ctx.framebuffer([color], depth), ctx.framebuffer([color]))
+def _shown(drawable: CoatDrawable | GuideDrawable) -> Coat | GuideLines:
+    return drawable.coat if isinstance(drawable, CoatDrawable) else drawable.lines
 
 
 def _finish(steps: Any) -> Any:

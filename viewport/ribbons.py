@@ -72,6 +72,22 @@ def far_to_near(
     return order
 
 
+def ribbon_corners(
+    order: NDArray[np.uint32], drawn: NDArray[np.intp], per_strand: int
+) -> Iterator[NDArray[np.uint32]]:
+    """Vertex numbers (k, 6) of the two triangles of every piece, at most SEGMENTS_AT_ONCE pieces at a time."""
+    pieces = np.uint32(len(drawn) - 1)
+    start_left, end_left = 2 * drawn[:-1], 2 * drawn[1:]
+    corners = np.stack(
+        [start_left, start_left + 1, end_left, end_left, start_left + 1, end_left + 1], axis=1
+    ).astype(np.uint32)
+    for start in range(0, len(order), SEGMENTS_AT_ONCE):
+        strand, piece = np.divmod(order[start : start + SEGMENTS_AT_ONCE], pieces)
+        numbers = corners[piece]
+        numbers += (strand * np.uint32(2 * per_strand))[:, None]
+        yield numbers
+
+
 class Ribbons:
     """The program and the index buffer that draw any strands whose sides and colours have been worked out."""
 
@@ -95,16 +111,8 @@ class Ribbons:
         samples : of the target for a pixel, on a side. across : how many hairs a ribbon stands for; with more than
         one it is drawn as so many strands side by side.
         """
-        pieces = np.uint32(len(drawn) - 1)
-        start_left, end_left = 2 * drawn[:-1], 2 * drawn[1:]
-        corners = np.stack(
-            [start_left, start_left + 1, end_left, end_left, start_left + 1, end_left + 1], axis=1
-        ).astype(np.uint32)
-        for start in range(0, len(order), SEGMENTS_AT_ONCE):
-            segments = order[start : start + SEGMENTS_AT_ONCE]
-            strand, piece = np.divmod(segments, pieces)
-            numbers = corners[piece]
-            numbers += (strand * np.uint32(2 * strands.per_strand))[:, None]
+        done = 0
+        for numbers in ribbon_corners(order, drawn, strands.per_strand):
             self.indices.orphan()
             self.indices.write(numbers.data)
             target.use()
@@ -118,12 +126,13 @@ class Ribbons:
             set_uniforms(vertices.program, {
                 "strand_sides": 1, "strand_colors": 2, "clip_from_world": clip_from_world,
                 "picture_size": (float(target.width), float(target.height)), "samples_per_pixel": float(samples),
-                "strands_across": across,
+                "strands_across": across, "margin": 0.0,
             })
-            vertices.render(moderngl.TRIANGLES, vertices=6 * len(segments))
+            vertices.render(moderngl.TRIANGLES, vertices=numbers.size)
             target.depth_mask = True
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST)
-            yield (start + len(segments)) / len(order)
+            done += len(numbers)
+            yield done / len(order)
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""

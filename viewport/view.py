@@ -41,10 +41,11 @@ from core.camera import Camera
 from core.overlay import Overlay
 from core.workspace import ViewOptions
 from viewport.context import collect
+from viewport.display_target import DisplayTarget, display_target
 from viewport.hud import LINE, ScreenImages, TextImage, plain_text
 from viewport.kept import same
 from viewport.light_maps import LightMaps
-from viewport.moving import DisplayTarget, Moving, display_target
+from viewport.moving import Moving
 from viewport.overlay_drawing import TONES, Byte3, MarkDrawing, Words, axes_marks, labels, marks
 from viewport.pictures import Pictures, read_image
 from viewport.renderer import Prepared, Renderer, light_directions
@@ -97,6 +98,8 @@ class View3D:
         self._version = 0
         self._lit: tuple[Any, ...] | None = None  # what the finished maps of the light were drawn for
         self._lighting: dict[str, Any] = {}
+        self._finished: tuple[Any, ...] | None = None  # what the last finished picture shows, and its number
+        self._finished_number = 0
 
     # what is shown
 
@@ -124,7 +127,7 @@ class View3D:
         """Rows of an array of hairs or guides in the scene were written to in place."""
         if len(rows):
             self.renderer.rows_changed(points, rows)
-            self.moving.rows_changed()
+            self.moving.rows_changed(points, np.asarray(rows))
             self._version += 1
 
     # drawing
@@ -140,8 +143,13 @@ class View3D:
         finished = None
         if self._lit is not None and same(self._lit, self._light_key()):
             finished = self.renderer.light_maps, self._lighting
+        target, picture = self._target(0), None
+        if self._finished is not None and same(self._finished, self._picture_key()):
+            picture = self._targets[0], self._finished_number
+        else:
+            self._finished = None
         shown = self.moving.draw(
-            self.scene, self.camera, self._target(0), self.size, self.options, hairs, finished
+            self.scene, self.camera, target, self.size, self.options, hairs, finished, picture
         )
         self.picture_changed = True
         return shown
@@ -170,8 +178,9 @@ class View3D:
         if self.camera is None:
             return
         scene, renderer = self.scene, self.renderer
-        lit = self._light_key()
+        lit, key = self._light_key(), self._picture_key()
         self._lit = None  # the maps are being drawn anew
+        self.moving.touched = []
         preparing = renderer.prepare(scene, self.camera, self.size, self.options)
         prepared: Prepared | None = None
         while prepared is None:
@@ -187,6 +196,8 @@ class View3D:
             for part in renderer.paint(prepared, self._target(1), samples, near_only):
                 yield low + (high - low) * part
             self._targets.reverse()
+            self._finished = key
+            self._finished_number += 1
             self.picture_changed = True
         yield 1.0
 
@@ -247,6 +258,14 @@ class View3D:
         assert self.camera is not None
         toward = light_directions(self.scene, self.camera)
         return (*self.scene.surfaces, bool(self.scene.coats), self.scene.lights, tuple(toward["key"].tolist()))
+
+    def _picture_key(self) -> tuple[Any, ...]:
+        """All that may not change for a finished picture to stay where nothing moves: all but points in place."""
+        guides = tuple(
+            lines._replace(points=lines.points.shape, states=lines.states.shape)  # type: ignore[arg-type]
+            for lines in self.scene.guides
+        )
+        return self.scene._replace(guides=()), guides, self.camera, self.size, self.options
 
     def _target(self, number: int) -> moderngl.Framebuffer:
         """The shown picture (0) or the one being drawn (1)."""

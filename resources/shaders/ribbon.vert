@@ -5,6 +5,7 @@ uniform sampler2D strand_colors;
 uniform mat4 clip_from_world;
 uniform vec2 picture_size;   // samples
 uniform float samples_per_pixel;   // on a side
+uniform float margin;              // added on both sides
 out float from_middle;
 out float half_width;
 out vec2 boxes;
@@ -23,7 +24,7 @@ void main()
     color = texelFetch(strand_colors, at, 0);
     along = float(point) / float(points_per_strand - 1);
     strand_seed = float(strand % 4096) * 0.6180339;
-    half_width = side.z * samples_per_pixel;
+    half_width = side.z * samples_per_pixel + margin;
     vec2 extent = abs(side.xy);
     boxes = vec2(max(extent.x, extent.y), max(min(extent.x, extent.y), 0.02));
     from_middle = (float(gl_VertexID & 1) * 2.0 - 1.0) * (half_width + 0.5 * (boxes.x + boxes.y));
