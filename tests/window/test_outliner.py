@@ -138,6 +138,7 @@ def test_names_are_changed_in_place(desk: Desk, tree: Outliner, qtbot: QtBot) ->
     qtbot.waitUntil(lambda: groom(desk, 1).name == "Fell 猫")
     assert desk.session.history.undo_name == "Rename"
     place = tree.visualRect(tree.scene.index_of(mesh(desk, 8))).center()
+    click(tree, qtbot, mesh(desk, 8))  # a hand's double click begins with one
     qtbot.mouseDClick(tree.viewport(), Qt.MouseButton.LeftButton, pos=place)
     qtbot.waitUntil(lambda: any(e.isVisible() for e in tree.findChildren(QLineEdit)))
     editor = next(e for e in tree.findChildren(QLineEdit) if e.isVisible())
