@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import cv2
 import moderngl
@@ -83,6 +84,7 @@ class ScreenImages:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        for thing in (*self.words.values(), self.vertices, self.program):
+        things: list[Any] = [*self.words.values(), self.vertices, self.program]
+        for thing in things:
             thing.release()
         self.words.clear()

@@ -81,7 +81,8 @@ class Moving:
         picture : the finished picture and its number, when since then only rows were changed: it stays elsewhere.
         """
         self._gather(scene, camera, size, hairs)
-        for drawable in (*self.coats, *self.guides):
+        drawables: list[CoatDrawable | GuideDrawable] = [*self.coats, *self.guides]
+        for drawable in drawables:
             _finish(drawable.upload())
         toward = light_directions(scene, camera)
         maps, lighting = finished if finished is not None else (self.light_maps, self._light(scene, toward["key"]))
@@ -89,7 +90,7 @@ class Moving:
         self._draw_base(scene, camera, size, options, uniforms, maps)
         assert self.base is not None
         maps.bind()
-        for drawable in (*self.coats, *self.guides):
+        for drawable in drawables:
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0}))
         behind, box = self.base, None
@@ -98,7 +99,7 @@ class Moving:
         self.touched = []
         self.ctx.copy_framebuffer(target, behind.framebuffer)
         view_row = -view_from_world(camera)[2]
-        for drawable in (*self.coats, *self.guides):
+        for drawable in drawables:
             strands = _shown(drawable).points
             rows = None if box is None else rows_in_box(strands, camera, size, box)
             order = _finish(far_to_near(strands, view_row, rows=rows))
@@ -242,7 +243,8 @@ class Moving:
         """Give back the memory; the context must be current."""
         self._release_base()
         self._release_behind()
-        for thing in (*self.coats, *self.guides, self.light_maps, self.patch):
+        things: list[Any] = [*self.coats, *self.guides, self.light_maps, self.patch]
+        for thing in things:
             thing.release()
         self.coats, self.guides = [], []
 

@@ -47,7 +47,7 @@ class Patch:
         if len(rows) == 0 or strands.count == 0:
             return
         pieces = strands.per_strand - 1
-        order = (np.asarray(rows, np.uint32)[:, None] * np.uint32(pieces) + np.arange(pieces, dtype=np.uint32)).ravel()
+        order = (rows.astype(np.int64)[:, None] * pieces + np.arange(pieces)).astype(np.uint32).reshape(-1)
         target = self.target.framebuffer
         target.use()
         self.ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)

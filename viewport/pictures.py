@@ -28,7 +28,7 @@ def read_image(path: str) -> NDArray[np.uint8] | None:
     if image is None:
         return None
     if image.dtype == np.uint16:
-        image = (image >> 8).astype(np.uint8)
+        image = (image // 257).astype(np.uint8)
     if image.dtype != np.uint8:
         image = (np.clip(np.nan_to_num(image.astype(np.float32)), 0.0, 1.0) * 255.0).astype(np.uint8)
     if image.ndim == 2:

@@ -18,7 +18,7 @@ from viewport.kept import matched
 from viewport.light_maps import LightMaps
 from viewport.near_side import shown_rows
 from viewport.ribbons import Ribbons, drawn_points, far_to_near
-from viewport.scene import Scene, direction, scene_extent
+from viewport.scene import Coat, GuideLines, Scene, direction, scene_extent
 from viewport.solids import PLAIN, Solids
 
 LARGEST_TILE = 4096  # samples on a side
@@ -126,7 +126,8 @@ class Renderer:
         away = 1.0 if camera.orthographic else max(float(view_row @ [*(0.5 * (low + high)), 1.0]), camera.near)
         scale = pixel_scale(camera, size[1]) * (0.5 if near_only else samples) / away
         pieces, orders = [], []
-        for strands in (*scene.coats, *scene.guides):
+        every: list[Coat | GuideLines] = [*scene.coats, *scene.guides]
+        for strands in every:
             rows = shown_rows(strands, camera, near_only)
             pieces.append(drawn_points(strands.points, scale))
             orders.append((yield from _told(far_to_near(strands.points, view_row, pieces[-1], rows), 0.1)))
@@ -135,11 +136,11 @@ class Renderer:
             painted = self._paint_tile(prepared, samples, tile, orders, pieces)
             yield from _scaled(painted, 0.1 + 0.9 * number / len(tiles), 0.1 + 0.9 * (number + 1) / len(tiles))
             assert self.tile is not None
-            rows = max(1, 2 * SAMPLES_AT_ONCE // (tile[2] * samples**2))
-            for bottom in range(0, tile[3], rows):
-                framebuffer.scissor = (tile[0], tile[1] + bottom, tile[2], min(rows, tile[3] - bottom))
+            band = max(1, 2 * SAMPLES_AT_ONCE // (tile[2] * samples**2))
+            for bottom in range(0, tile[3], band):
+                framebuffer.scissor = (tile[0], tile[1] + bottom, tile[2], min(band, tile[3] - bottom))
                 self.backdrop.resolved(self.tile[0], scene, size, samples, tile, framebuffer)
-                framebuffer.scissor = None
+                framebuffer.scissor = None  # type: ignore[assignment]
                 yield 0.1 + 0.9 * (number + 1) / len(tiles)
         yield 1.0
 
@@ -169,10 +170,10 @@ class Renderer:
             target.scissor = (0, bottom, target.width, rows)
             self.light_maps.bind()
             self.solids.draw(scene, camera, target, uniforms, prepared.options, samples)
-            target.scissor = None
+            target.scissor = None  # type: ignore[assignment]
             yield 0.05 * bottom / target.height
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
-        total, before = max(sum(len(order) for order in orders), 1), 0
+        total, before = max(sum(len(order) for order in orders), 1), 0.0
         for textures, order, points in zip(drawn, orders, pieces, strict=True):
             share = 0.95 * len(order) / total
             for part in self.ribbons.draw(textures, order, points, matrix, target, samples):

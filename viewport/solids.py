@@ -96,6 +96,7 @@ class Solids:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        for thing in (*self.meshes, self.grid, self.programs):
+        things: list[Any] = [*self.meshes, self.grid, self.programs]
+        for thing in things:
             thing.release()
         self.meshes = []

@@ -1,6 +1,6 @@
 // Guides: a colour by state and a constant width in pixels, tapering a little to the tip.
 in vec2 unused;
-uniform sampler2D strand_tints;    // rgb colour
+uniform sampler2D strand_tints;    // rgb colour, opacity
 uniform int strand_count;
 uniform float line_pixels;
 uniform mat4 clip_from_world;
@@ -23,5 +23,6 @@ void main()
     float length2 = dot(line, line);
     vec2 side = length2 > 1e-12 ? vec2(-line.y, line.x) * inversesqrt(length2) : vec2(1.0, 0.0);
     out_side = vec4(side, 0.5 * line_pixels * mix(1.0, 0.6, u), 1.0);
-    out_color = vec4(shown(texelFetch(strand_tints, ivec2(in_row, row), 0).rgb), 1.0);
+    vec4 tint = texelFetch(strand_tints, ivec2(in_row, row), 0);
+    out_color = vec4(shown(tint.rgb), tint.a);
 }

@@ -13,6 +13,8 @@ from viewport.scene import GuideLines
 from viewport.shaders import program, set_uniforms
 from viewport.strand_textures import StrandTextures
 
+PLAIN_OPACITY = 0.55  # of guides nothing is said about: the coat stays in sight
+
 
 class GuidePrograms:
     """The program all guides are drawn with."""
@@ -26,10 +28,11 @@ class GuidePrograms:
 
 
 def guide_colors(lines: GuideLines) -> NDArray[np.float32]:
-    """(G, 4) float32 linear RGB of each guide by its state, and 1."""
+    """(G, 4) float32 linear RGB and opacity of each guide by its state."""
     out = np.ones((len(lines.states), 4), np.float32)
     palette = np.asarray(lines.colors, np.float32)
     out[:, :3] = palette[np.minimum(lines.states, len(palette) - 1)]
+    out[lines.states == 0, 3] = PLAIN_OPACITY
     return out
 
 
