@@ -103,6 +103,9 @@ class Hand:
             return
         if pointer is not None:
             self.move((pointer,))
+        behind = self._pen.caught_up()
+        if behind:  # a stroke ends where the hand lets go
+            self._extend(behind)
         tool = self._tool
         try:
             guides = self._guides
@@ -160,7 +163,9 @@ class Hand:
         try:
             tool = self._tool or self.tool_for(pointer)
             grounds = self._grounds(sight, tool) if self._tool is None else tuple(g for _, g in self._strokes)
-            found = tool.hover(grounds[0], pointer)
+            # amidst a stroke its own overlays speak; only the ring goes with them
+            alone = self._tool is None or isinstance(tool.params, RingParams)
+            found = tool.hover(grounds[0], pointer) if alone else ()
             if len(grounds) > 1:
                 found += _ghost(tool, grounds[0], pointer)
         except UserError:

@@ -41,6 +41,7 @@ class Pen:
         self.settings = settings
         self._first: Pointer | None = None
         self._last: Pointer | None = None
+        self._raw: Pointer | None = None
         self._lightest = 1.0
 
     def filtered(self, pointers: tuple[Pointer, ...]) -> tuple[Pointer, ...]:
@@ -53,11 +54,19 @@ class Pen:
         """
         return tuple(self._one(pointer) for pointer in pointers)
 
+    def caught_up(self) -> tuple[Pointer, ...]:
+        """One more sample where the hand really is, when smoothing has left the newest one behind; else none."""
+        if self._last is None or self._raw is None or (self._last.x, self._last.y) == (self._raw.x, self._raw.y):
+            return ()
+        self._last = self._last._replace(x=self._raw.x, y=self._raw.y)
+        return (self._last,)
+
     def _one(self, pointer: Pointer) -> Pointer:
         if not np.isfinite([pointer.x, pointer.y, pointer.pressure, pointer.time]).all():
             raise UserError("The pen sent a place that is no number; lift it and try again.")
         if self._first is None:
             self._first = pointer
+        self._raw = pointer
         pressure = min(max(pointer.pressure, 0.0), 1.0)
         if self.settings.spikes and pointer.time - self._first.time < SETTLING and self._first.pressure < 1.0:
             # a hand presses on gradually: the lightest touch so far is the one that was meant

@@ -234,7 +234,10 @@ class Tool(Generic[P]):
         raise NotImplementedError
 
     def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
-        """What to draw over the picture at the pointer: the ring of brushes, nothing for others."""
+        """What to draw over the picture at the pointer: the ring of brushes, nothing for others.
+
+        Tools without a ring are not asked while a stroke goes on.
+        """
         return ring_overlays(self.params, ground, pointer) if isinstance(self.params, RingParams) else ()
 
 

@@ -41,7 +41,7 @@ def line(start, end, count=12, **more) -> tuple[Pointer, ...]:
 
 
 @functools.cache
-def symmetric_fur(count: int = 120) -> Guides:
+def symmetric_fur(count: int = 500) -> Guides:
     guides = fur(count)
     away = np.abs(guides.points[:, 0, 0]) > 0.05
     return mirror(take_rows(guides, away), ball().skin)

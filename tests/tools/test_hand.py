@@ -278,7 +278,7 @@ def test_in_a_pose_the_far_side_is_that_of_the_pose():
     roots = ground.guides.points[:, 0].astype(np.float64)
     nearest = np.argmin(np.linalg.norm(roots[:, None] - skin.points, axis=2), axis=1)
     facing = np.einsum("na,na->n", skin.normals[nearest], np.array([0.0, 0.0, 6.0]) - roots)
-    clear = np.abs(facing) > 0.8
+    clear = np.abs(facing) > 1.6
     assert np.array_equal(ground.screen.seen[clear], facing[clear] > 0.0)
 
 

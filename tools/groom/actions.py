@@ -177,7 +177,13 @@ def _set_length(guides: Guides, scene: Scene, params: LengthParams) -> Guides:
 
 
 def _mirror(guides: Guides, scene: Scene, params: MirrorParams) -> Guides:
-    return mirror(guides, scene.skin, source=1 if params.source == "+X" else -1)
+    side = 1 if params.source == "+X" else -1
+    copied = guides.points[:, 0, 0] * side > 0.0
+    if guides.selected.any():
+        copied &= guides.selected
+    if not copied.any():  # the other side would be cleared for nothing
+        raise UserError(f"There is no hair on the {params.source} side to copy; choose the other side.")
+    return mirror(guides, scene.skin, source=side)
 
 
 def _smooth(guides: Guides, scene: Scene, params: SmoothParams) -> Guides:

@@ -11,6 +11,8 @@ from tools.brush import BrushStroke, on_rows
 from tools.ring import BrushParams
 from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
 
+PASS = 2.0  # hold that a way of one radius adds at strength 1: a pass locks what the inner half of the ring goes over
+
 
 class HairsprayParams(BrushParams):
     """Settings of Hairspray."""
@@ -49,5 +51,5 @@ class HairsprayStroke(BrushStroke[HairsprayParams]):
     def brush(self, guides: Guides) -> Guides:
         """Guides sprayed under the ring."""
         rows, reach = self.under(guides)
-        p, amount = self.params, self.dose
+        p, amount = self.params, PASS * self.dose
         return on_rows(guides, rows, lambda g: spray(g, amount, reach, p.start, p.end))

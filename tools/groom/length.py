@@ -13,7 +13,7 @@ from tools.brush import BrushStroke, on_rows
 from tools.ring import BrushParams
 from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
 
-RATE = 0.5  # at strength 1 hair grows by exp of this on a way of one radius
+RATE = 0.7  # at strength 1 hair grows by exp of this on a way of one radius
 APPROACH = 3.0  # and comes to within exp of minus this of a length
 SHORTEST = 1e-4  # of the animal's diagonal
 

@@ -8,6 +8,8 @@ from tools.brush import BrushStroke, on_rows
 from tools.ring import BrushParams
 from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
 
+PASS = 2.0  # hold that a way of one radius takes away at strength 1
+
 
 class WashParams(BrushParams):
     """Settings of Wash."""
@@ -40,5 +42,5 @@ class WashStroke(BrushStroke[WashParams]):
     def brush(self, guides: Guides) -> Guides:
         """Guides washed under the ring."""
         rows, reach = self.under(guides)
-        amount = self.dose
+        amount = PASS * self.dose
         return on_rows(guides, rows, lambda g: wash(g, amount, reach))
