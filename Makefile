@@ -17,8 +17,9 @@ help: ## show this list
 .venv/ready: requirements.lock pyproject.toml .ci/setup
 	@bash .ci/setup
 
-run: .venv/ready ## groom the demo animal (or FILE=mesh): out/demo.filo, out/demo.usdc, out/demo.png
-	@$(PY) -m app demo $(if $(FILE),--mesh "$(FILE)",)
+run: .venv/ready ## open the window on the demo animal (or FILE=); without a display groom it into out/ instead
+	@if [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ]; then $(PY) -m app window $(if $(FILE),"$(FILE)",--demo); \
+	else $(PY) -m app demo $(if $(FILE),--mesh "$(FILE)",); fi
 
 test: .venv/ready ## every test, GL through EGL included (under 10 minutes on 2 cores)
 	@$(PY) -m pytest

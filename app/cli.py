@@ -11,13 +11,15 @@ import json
 import os
 import sys
 import traceback
+from pathlib import Path
 
 import typer
 
 from core.errors import UserError
 
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
-COMMANDS = ("groom", "convert", "info", "check", "render", "run", "bench", "doctor", "demo")
+COMMANDS = ("window", "groom", "convert", "info", "check", "render", "run", "bench", "doctor", "demo")
+HELP = ("-h", "--help")
 
 
 # typer carries a click of its own; this is its base class of everything said wrongly on the command line
@@ -28,15 +30,16 @@ def build(names: tuple[str, ...] = COMMANDS) -> typer.Typer:
     """The typer application with these commands; a command's module is only loaded when it is named."""
     cli = typer.Typer(
         name="filoplume",
-        help="Groom hair on real animals: meshes, documents and coats in, coats and pictures out.",
+        help="Groom hair on real animals: by hand in a window, or meshes and coats in, coats and pictures out.",
         no_args_is_help=True,
+        epilog="Without a command the window opens: filoplume [FILE], see filoplume window --help.",
         add_completion=False,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     for name in names:
         module = importlib.import_module(f"app.commands.{name}")
-        cli.command(name, no_args_is_help=name not in ("bench", "doctor", "demo"))(module.command)
+        cli.command(name, no_args_is_help=name not in ("window", "bench", "doctor", "demo"))(module.command)
     return cli
 
 
@@ -78,11 +81,23 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _run(arguments: list[str]) -> int:
+    if _wants_window(arguments):
+        arguments = ["window", *arguments]
     chosen = next((a for a in arguments if not a.startswith("-")), None)
     # one command alone would lose its name, so a second, light one stands beside it
     names = tuple(dict.fromkeys((chosen, "run"))) if chosen in COMMANDS else COMMANDS
     command = typer.main.get_command(build(names if len(names) > 1 else ("run", "bench")))
     return command(args=arguments, prog_name="filoplume", standalone_mode=False) or 0
+
+
+def _wants_window(arguments: list[str]) -> bool:
+    """True without a command: no words at all, options of the window, or a file (a mistyped command is none)."""
+    if not arguments:
+        return True
+    first = arguments[0]
+    if first.startswith("-"):
+        return first not in (*HELP, "--json")
+    return first not in COMMANDS and (Path(first).suffix != "" or Path(first).exists())
 
 
 def _fail(sentence: str, as_json: bool, code: int) -> int:

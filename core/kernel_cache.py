@@ -10,6 +10,7 @@ import hashlib
 import os
 import shutil
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from platformdirs import user_cache_path
@@ -35,12 +36,36 @@ def source_hash() -> str:
     """A short hash of every source file of core that has to do with numba."""
     root = Path(__file__).parent
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        text = path.read_bytes()
-        if b"numba" in text:
-            digest.update(str(path.relative_to(root)).encode())
-            digest.update(text)
+    for path in _kernel_files():
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def kernel_modules() -> tuple[str, ...]:
+    """Names of the modules whose import compiles kernels, or loads them when they are in the cache."""
+    root = Path(__file__).parent
+    found = (path.relative_to(root.parent).with_suffix("").parts for path in _kernel_files())
+    return tuple(".".join(parts) for parts in found if parts[-1] != Path(__file__).stem)
+
+
+def kernels_compiled() -> bool:
+    """True when :func:`note_compiled` was called for these sources."""
+    return _note().exists()
+
+
+def note_compiled() -> None:
+    """All kernels are in the cache now. A folder that cannot be written to is no reason to stop."""
+    with suppress(OSError):
+        _note().touch()
+
+
+def _note() -> Path:
+    return Path(os.environ.get("NUMBA_CACHE_DIR", "")) / f"compiled-{source_hash()}"
+
+
+def _kernel_files() -> list[Path]:
+    return sorted(path for path in Path(__file__).parent.rglob("*.py") if b"numba" in path.read_bytes())
 
 
 def _forget_old(current: Path) -> None:

@@ -14,6 +14,7 @@ import moderngl
 from core.camera import Camera
 from core.errors import UserError
 from core.overlay import Overlay
+from core.workspace import ViewOptions
 from tools.session import Session
 from viewport.density import DensityController
 from viewport.hud import TextImage
@@ -46,7 +47,7 @@ class LivePicture:
         self._refining: Iterator[float] | None = None
         self._finished = False
         self._scene = Scene()
-        self._size = (1, 1)
+        self._size, self._options = (1, 1), ViewOptions()
         self._jobs = 0
         self.session = session
         self.live = LiveScene(session.evaluator)
@@ -73,9 +74,9 @@ class LivePicture:
         moving : a hand or the timeline moves things, so nothing slow is begun.
         """
         workspace = self.session.workspace
-        self._size = size
+        self._size, self._options = size, shown_options(self.session)
         change = self.live.update(
-            self.session.document, workspace.frame, workspace.view, moving, self.density.drawn, workspace.groom)
+            self.session.document, workspace.frame, self._options, moving, self.density.drawn, workspace.groom)
         changed = self._take(change, camera)
         if not moving:
             self._ask()
@@ -116,7 +117,7 @@ class LivePicture:
         self._scene, self.troubles = change.scene, change.troubles
         self.total = sum(len(c.ids if c.order is None else c.order) for c in change.scene.coats)
         self.density.limit(max((len(c.ids if c.order is None else c.order) for c in change.scene.coats), default=0))
-        changed = self.view.begin(change.scene, camera, self._size, self.session.workspace.view)
+        changed = self.view.begin(change.scene, camera, self._size, self._options)
         for points, rows in change.rows:
             self.view.rows_changed(points, rows)
         if changed or change.rows:
@@ -142,6 +143,19 @@ class LivePicture:
             self._jobs -= 1
             live.abandon(job, error if isinstance(error, UserError) else UserError(str(error) or "it was cancelled"))
             self._adopted()
+
+
+def shown_options(session: Session) -> ViewOptions:
+    """The options of the view; guides also show while the tool is about guides, and where there is no hair to see."""
+    view = session.workspace.view
+    if view.guides:
+        return view
+    tool = session.tool
+    bare = not view.hair or all(groom.coat.count == 0 for groom in session.document.grooms)
+    if bare or tool.at_rest or tool.edits in ("selection", "hold"):
+        shown: ViewOptions = view.replace(guides=True)
+        return shown
+    return view
 
 
 class Stopwatch:

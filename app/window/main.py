@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QByteArray, Qt
+from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -24,13 +25,19 @@ from app.window.all_commands import all_commands
 from app.window.commands import Commands
 from app.window.console import Console
 from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
+from app.window.crash import CrashBar, CrashWatch
 from app.window.desk import Desk
+from app.window.doors import Doors
 from app.window.file_actions import FileActions
 from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
+from app.window.opening import Opening
+from app.window.outliner import Outliner
 from app.window.palette import Palette
 from app.window.preferences import Preferences
+from app.window.recovery_bar import RecoveryBar
+from app.window.screenshot import Photographer
 from app.window.sections import Column, FoldMemory, Section
 from app.window.settings import Settings, save_settings
 from app.window.shelf import Shelf
@@ -44,7 +51,8 @@ from app.window.window_commands import PANELS
 from core.camera import Camera
 from core.document import Document
 from core.errors import UserError
-from core.workspace import Workspace
+from core.formats.journal import Journal
+from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
@@ -67,13 +75,19 @@ class MainWindow(QMainWindow):
         self.commands.add(all_commands(session.tools))
         loaded = keymaps.load(settings.keymap, folder)
         self.hotkeys = Hotkeys(self, self.commands, loaded.keymap)
+        self.opening = Opening(self.desk, self, self.make_session, self.remember)
         self.files = FileActions(self)
-        self._use_pen()
+        self.crash_watch = CrashWatch(parent=self)
+        self.photographer: Photographer | None = None
+        self._keeps_place = True
         self.viewport = Viewport(self.desk, self.hotkeys, self.commands, self, settings.density_ms)
         self.top = TopBar(self.desk, self.commands, self.hotkeys)
         self.shelf = Shelf(self.desk, lambda tool: self.hotkeys.keymap.shown(f"tool.{tool}"))
         self.view = ViewHost(self.viewport, self)
+        self.doors = Doors(self.desk, self.opening, lambda: self._settings.recent)
         self.middle = QStackedWidget()
+        self.recovery = RecoveryBar(self.desk)
+        self.crash = CrashBar(self.crash_watch)
         self.status = StatusLine(self.desk, self.hotkeys)
         self.timeline = Timeline(self.desk)
         self.panels: dict[str, QWidget] = {"shelf": self.shelf, "timeline": self.timeline}
@@ -81,9 +95,11 @@ class MainWindow(QMainWindow):
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
         self._lay_out()
+        self._assist_commands()
         self.setAcceptDrops(True)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.desk.session_replaced.connect(self._session_replaced)
+        self.doors.needed.connect(lambda empty: self._show_middle())
+        self.desk.session_replaced.connect(self._take_session)
         self.desk.changed.connect(self._document_changed)
         self.desk.workspace_changed.connect(self._workspace_changed)
         self.timeline.playback.changed.connect(self._playback_changed)
@@ -92,15 +108,15 @@ class MainWindow(QMainWindow):
         for trouble in (loaded.trouble, *(f"{t.file}: {t.reason}" for t in session.tools.troubles)):
             if trouble:
                 self.desk.error(UserError(trouble))
-        self._show_panels()
-        self._show_title()
-        self._show_middle()
+        self._take_session()
 
     # -- how it is put together --------------------------------------------------------------------------
 
     def _make_column(self) -> Column:
         memory, column = FoldMemory(self._folder), Column()
+        self.outliner = Outliner(self.desk)
         made: tuple[tuple[str, QWidget], ...] = (
+            ("scene", Section(PANELS["scene"][0], self.outliner, memory, "scene")),
             ("tool", ToolPanel(self.desk, memory)),
             ("respect", RespectPanel(self.desk, memory)),
             ("coat", CoatPanel(self.desk, memory)),
@@ -115,6 +131,7 @@ class MainWindow(QMainWindow):
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
         self.middle.addWidget(self.view)
+        self.middle.addWidget(self.doors)
         self.split.addWidget(self.middle)
         self.split.addWidget(self.column)
         self.split.setStretchFactor(0, 1)
@@ -128,7 +145,8 @@ class MainWindow(QMainWindow):
         down = QVBoxLayout(whole)
         down.setContentsMargins(0, 0, 0, 0)
         down.setSpacing(0)
-        down.addWidget(self.top)
+        for bar in (self.top, self.recovery, self.crash):
+            down.addWidget(bar)
         down.addLayout(across, 1)
         down.addWidget(self.timeline)
         down.addWidget(self.status)
@@ -147,6 +165,28 @@ class MainWindow(QMainWindow):
         if settings.panels:
             self.split.restoreState(QByteArray(base64.b64decode(settings.panels)))
 
+    def _assist_commands(self) -> None:
+        """Files are a piece of their own; commands find what it does at the window."""
+        files, opening = self.files, self.opening
+        self.new_document, self.save, self.save_as, self.save_copy = (
+            files.new_document, files.save, files.save_as, files.save_copy)
+        self.show_recent, self.reload_mesh, self.export_coat = files.show_recent, files.reload_mesh, files.export_coat
+        self.save_screenshot, self.save_macro, self.play_macro = (
+            files.save_screenshot, files.save_macro, files.play_macro)
+        self.choose_background, self.pin_reference = files.choose_background, files.pin_reference
+        self.restart_safe, self.import_mesh = files.restart_safe, opening.ask_import
+
+    def make_session(self, document: Document | None = None, *args: Any, **settings: Any) -> Session:
+        """A session for this window: with a journal, so that a crash loses nothing, and with its tools."""
+        journal = Journal(hashes=settings.get("hashes"))
+        if not args and "workspace" not in settings:
+            settings["workspace"] = fresh_workspace()
+        return Session(document, *args, journal=journal, tools=self.desk.session.tools, **settings)
+
+    def remember(self, path: Path) -> None:
+        """A file was opened or saved: it leads the recent ones."""
+        self.change_settings(recent=self._settings.opened(path).recent)
+
     # -- what commands ask for ---------------------------------------------------------------------------
 
     @property
@@ -158,6 +198,13 @@ class MainWindow(QMainWindow):
     def playing(self) -> bool:
         """True during playback."""
         return self.timeline.playback.playing
+
+    def open_file(self, path: Path | None = None) -> None:
+        """Open a project or a mesh; asks for it when it is not given."""
+        if path is None:
+            self.opening.ask()
+        else:
+            self.opening.open(path)
 
     def look(self, camera: Camera) -> None:
         """Look through a camera."""
@@ -257,11 +304,37 @@ class MainWindow(QMainWindow):
         if self._preferences is not None:
             self._preferences.refresh()
 
-    def __getattr__(self, name: str) -> Any:
-        # files are a piece of their own, which commands need not know
-        if name in FileActions.COMMANDS:
-            return getattr(self.files, name)
-        raise AttributeError(name)
+    # -- what the start asks for -------------------------------------------------------------------------
+
+    @property
+    def settled(self) -> bool:
+        """True when nothing goes on: no job, no picture to be finished."""
+        if self.desk.jobs.running or self.desk.session.stroking:
+            return False
+        return self.viewport.at_rest or not self.view.shows_picture
+
+    def when_settled(self, call: Callable[[], object]) -> None:
+        """Call something once, as soon as nothing goes on."""
+        def look() -> None:
+            if self.settled:
+                timer.stop()
+                call()
+
+        timer = QTimer(self, interval=50)
+        timer.timeout.connect(look)
+        timer.start()
+
+    def offer_lost_work(self) -> None:
+        """Offer what a killed program left behind, and say what it died of; nothing waits for the answer."""
+        self.crash_watch.install()
+        self.commands.noted = self.crash_watch.note
+        self.crash.tell_of_last_run(self.crash_watch)
+        self.recovery.look()
+
+    def close_unasked(self) -> None:
+        """Leave without a trace in the preferences or the journal: for a picture of the window."""
+        self._keeps_place = False
+        self.close()
 
     # -- what changes ------------------------------------------------------------------------------------
 
@@ -283,7 +356,13 @@ class MainWindow(QMainWindow):
         self.setWindowModified(not session.saved)
 
     def _show_middle(self) -> None:
+        self.middle.setCurrentWidget(self.view if self.desk.document.meshes else self.doors)
         self.status.show_hint()
+
+    def show_saved(self) -> None:
+        """The work is in its file now."""
+        self._show_title()
+        self.top.refresh()
 
     def _show_unit(self) -> None:
         for panel in self.panels.values():
@@ -294,7 +373,7 @@ class MainWindow(QMainWindow):
         if self.viewport.picture is not None:
             self.timeline.set_cached(self.viewport.picture.live.cached_frames(self.desk.document))
 
-    def _session_replaced(self) -> None:
+    def _take_session(self) -> None:
         self._use_pen()
         self.desk.session.history.budget = self._settings.history_mb << 20
         self._show_panels()
@@ -305,8 +384,6 @@ class MainWindow(QMainWindow):
         if self.desk.session.stroking:
             return
         self._show_title()
-        if bool(old.meshes) != bool(new.meshes):
-            self._show_middle()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
         if old.panels != new.panels:
@@ -338,25 +415,32 @@ class MainWindow(QMainWindow):
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Files may be dropped."""
-        if event.mimeData().hasUrls():
+        if self.opening.takes(event.mimeData()):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """A project or a mesh is opened, an image is pinned to the view."""
-        self.files.drop([Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()])
+        """A project or a mesh is opened, a picture is pinned to the view."""
+        event.acceptProposedAction()
+        self.opening.dropped(event.mimeData().urls())
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Nothing is asked: what is not saved is in the journal and offered at the next start."""
         self.timeline.playback.pause()
         self.desk.end_stroke()
         self.view.dock()
-        self.change_settings(
-            geometry=_text(self.saveGeometry()), panels=_text(self.split.saveState()))
+        if self._keeps_place:
+            self.change_settings(geometry=_text(self.saveGeometry()), panels=_text(self.split.saveState()))
         self.desk.jobs.close()
         self.viewport.release_gl()
         self.desk.session.changed = None
-        self.desk.session.close()
+        self.desk.session.close(discard=not self._keeps_place)
+        self.crash_watch.close()
         event.accept()
+
+
+def fresh_workspace() -> Workspace:
+    """Where a new document begins: with the comb, the coat seen as it is; guides show themselves when they are meant."""
+    return Workspace(tool="comb", panels=tuple(PANELS), view=ViewOptions(guides=False))
 
 
 def _text(data: QByteArray) -> str:

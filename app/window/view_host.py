@@ -39,6 +39,11 @@ class ViewHost(QWidget):
         """True while the viewport is in a window of its own."""
         return self._floating is not None
 
+    @property
+    def shows_picture(self) -> bool:
+        """True when the viewport is on the screen, wherever."""
+        return self.viewport.isExposed()
+
     def float_out(self) -> None:
         """Give the viewport a window of its own; closing that brings it back."""
         if self._floating is None and self.trouble.isHidden():

@@ -255,7 +255,7 @@ class Viewport(QOpenGLWindow):
         self.redraw()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
-        seen = ("frame", "view", "groom", "cameras")
+        seen = ("frame", "view", "groom", "cameras", "tool")
         if any(getattr(old, name) is not getattr(new, name) for name in seen):
             self.redraw()
         else:
