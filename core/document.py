@@ -10,7 +10,7 @@ from core.errors import UserError
 from core.field import field
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
-from core.pose.skeleton import Rig
+from core.pose.rig import Rig
 from core.record import Record, number, text
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}

@@ -10,7 +10,7 @@ from core.evaluator import Evaluator
 from core.mesh.distance_field import DistanceField, build_distance_field
 from core.mesh.mesh import Mesh
 from core.mesh.skin import FIELD_CELLS, Skin, distance_field, skin_at_rest, skin_posed
-from core.pose.skeleton import Rig
+from core.pose.rig import Rig
 from core.pose.skinning import posed_points
 from core.record import freeze
 

@@ -10,7 +10,7 @@ from core.evaluator import Evaluator
 from core.mesh.mesh import Mesh
 from core.mesh.normals import mesh_normals
 from core.mesh.skin import Posed, skin_at_rest
-from core.pose.skeleton import Rig
+from core.pose.rig import Rig
 from core.posed import moves, points_at
 
 

@@ -9,7 +9,7 @@ from core.demo.rig import rig
 from core.demo.shape import shape
 from core.groom.groom import Map
 from core.mesh.mesh import Mesh
-from core.pose.skeleton import Rig
+from core.pose.rig import Rig
 
 
 class Creature(NamedTuple):

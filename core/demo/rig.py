@@ -6,7 +6,8 @@ import numpy as np
 
 from core.curve import Curve, Key, curve_at
 from core.demo.shape import Shape
-from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
+from core.pose.rig import Rig
+from core.pose.skeleton import Clip, Skeleton, SkinWeights
 from core.transform import quaternion_about, quaternion_product, translation
 
 FIRST_FRAME, FRAMES = 1001, 48

@@ -42,6 +42,7 @@ class Clip(Record, kw_only=True):
     translations : (F, J, 3) float32, metres.
     rotations : (F, J, 4) float32, quaternions x, y, z, w.
     scales : (F, J, 3) float32.
+    number_names : of abstract controls that move too. numbers : (F, N) float32, their values, None without names.
     """
 
     name: str = "clip"
@@ -50,6 +51,8 @@ class Clip(Record, kw_only=True):
     translations: np.ndarray
     rotations: np.ndarray
     scales: np.ndarray
+    number_names: tuple[str, ...] = ()
+    numbers: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         text(self, "name")
@@ -61,6 +64,12 @@ class Clip(Record, kw_only=True):
             raise ValueError("Clip needs at least one frame")
         column(self, "rotations", np.float32, (frames, joints, 4))
         column(self, "scales", np.float32, (frames, joints, 3))
+        if len(set(self.number_names)) != len(self.number_names) or not all(self.number_names):
+            raise ValueError("Clip.number_names must be unique and not empty")
+        if (self.numbers is None) != (not self.number_names):
+            raise ValueError("Clip.numbers must have a column for each of its names, or be None without any")
+        if self.numbers is not None:
+            column(self, "numbers", np.float32, (frames, len(self.number_names)))
 
     @property
     def end(self) -> float:
@@ -72,7 +81,7 @@ class SkinWeights(Record):
     """Which joints move each vertex.
 
     joints : (V, K) int32.
-    weights : (V, K) float32, >= 0, each row summing to 1.
+    weights : (V, K) float32, >= 0, each row summing to 1. Without columns (K = 0) no joint moves anything.
     """
 
     joints: np.ndarray
@@ -85,18 +94,3 @@ class SkinWeights(Record):
             self.weights.min() < 0.0 or np.abs(self.weights.sum(axis=1, dtype=np.float64) - 1.0).max() > 1e-3
         ):
             raise ValueError("SkinWeights.weights must be positive and sum to 1 on every vertex")
-
-
-class Rig(Record):
-    """A skeleton, the skin it moves and, where there is one, its motion."""
-
-    skeleton: Skeleton
-    skin: SkinWeights
-    clip: Clip | None = None
-
-    def __post_init__(self) -> None:
-        joints = len(self.skeleton.names)
-        if self.skin.joints.size and not (self.skin.joints.min() >= 0 and self.skin.joints.max() < joints):
-            raise ValueError("SkinWeights.joints names a joint the skeleton does not have")
-        if self.clip is not None and self.clip.translations.shape[1] != joints:
-            raise ValueError("Clip has another number of joints than the skeleton")

@@ -10,7 +10,8 @@ from numba.core.types import Array, float32, float64, int32, int64, void
 from numpy.typing import NDArray
 
 from core.errors import UserError
-from core.pose.skeleton import Clip, Rig, Skeleton
+from core.pose.rig import Rig
+from core.pose.skeleton import Clip, Skeleton
 from core.transform import compose, slerp
 from core.workers import serial_ranges
 

@@ -18,7 +18,8 @@ from core.document import (
 )
 from core.errors import UserError
 from core.field import fields_of
-from core.pose.skeleton import Rig, Skeleton, SkinWeights
+from core.pose.rig import Rig
+from core.pose.skeleton import Skeleton, SkinWeights
 from core.workspace import Workspace
 from tests.documents import grid_mesh, small_document
 

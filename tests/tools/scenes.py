@@ -13,7 +13,8 @@ from core.groom.groom import Groom, Map
 from core.groom.guides import Guides
 from core.groom.mirror import mirror
 from core.groom.rows import no_guides, take_rows
-from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
+from core.pose.rig import Rig
+from core.pose.skeleton import Clip, Skeleton, SkinWeights
 from core.record import freeze
 from core.workspace import Workspace
 from tests.core.groom.small_grooms import ball, fur

@@ -19,7 +19,8 @@ from core.formats.project import check_project, project_info, read_project, writ
 from core.formats.tree import decode_envelope, encode_tree
 from core.formats.upgrade import FORMAT, upgrade
 from core.leaves import array_bytes, leaves, same_bits
-from core.pose.skeleton import Clip, Rig, Skeleton, SkinWeights
+from core.pose.rig import Rig
+from core.pose.skeleton import Clip, Skeleton, SkinWeights
 from core.record import freeze, is_frozen
 from core.value import formula
 from core.workspace import Workspace
