@@ -74,6 +74,7 @@ class Jobs(QObject):
         self._desk = desk
         self._jobs: list[Job] = []
         self._news: SimpleQueue[tuple[Job, str, Any]] = SimpleQueue()
+        self._own = threading.local()  # `job` is that of the thread
         self._lock = threading.Lock()  # over _closed and the waking
         self._closed = self._awake = False
         self._bridge = _Bridge(self)
@@ -118,12 +119,13 @@ class Jobs(QObject):
         job.stop.set()
         self.changed.emit()
 
-    def on_window(self, job: Job, function: Callable[..., Any], *args: Any) -> Any:
-        """Called by a job: run something on the thread of the window and wait for what it gives.
+    def on_window(self, function: Callable[..., Any], *args: Any) -> Any:
+        """Called by the function of a job: run something on the thread of the window and wait for what it gives.
 
         When it gives an iterator, that is stepped one item at a time between the window's events, and its last item is
         the answer: long drawing stays short slices. Raises what it raised, :class:`Cancelled` when the job is.
         """
+        job: Job = self._own.job
         answer: SimpleQueue[tuple[bool, Any]] = SimpleQueue()
         self._tell(job, "call", (function, args, answer))
         while True:
@@ -157,6 +159,7 @@ class Jobs(QObject):
                 raise Cancelled
             self._tell(job, "progress", float(fraction))
 
+        self._own.job = job
         try:
             result = function(progress, job.stop.is_set)
         except BaseException as error:  # a SystemExit of some library must not end in silence either
@@ -165,6 +168,7 @@ class Jobs(QObject):
             self._tell(job, "failed", (error, text))
         else:
             self._tell(job, "done", result)
+        del self._own.job  # its callbacks are let go of by the window's thread only
 
     def _tell(self, job: Job, what: str, value: Any) -> None:
         self._news.put((job, what, value))

@@ -136,16 +136,15 @@ def test_a_job_asks_the_window_and_waits(desk: Desk, qtbot: QtBot) -> None:
         raise UserError("No.")
 
     def work(progress: Any, cancelled: Any) -> list[Any]:
-        found: list[Any] = [desk.jobs.on_window(box[0], lambda: QThread.currentThread() is window)]
-        found.append(desk.jobs.on_window(box[0], slices, 5))
+        found: list[Any] = [desk.jobs.on_window(lambda: QThread.currentThread() is window)]
+        found.append(desk.jobs.on_window(slices, 5))
         try:
-            desk.jobs.on_window(box[0], refuse)
+            desk.jobs.on_window(refuse)
         except UserError as error:
             found.append(str(error))
         return found
 
-    box: list[Any] = []
-    box.append(desk.jobs.start("Ask", lambda p, c: (time.sleep(0.02), work(p, c))[1], answers.append))
+    desk.jobs.start("Ask", work, answers.append)
     qtbot.waitUntil(lambda: bool(answers))
     assert answers == [[True, 4, "No."]]
 
@@ -163,14 +162,13 @@ def test_nothing_is_delivered_to_a_widget_that_is_gone(desk: Desk, qtbot: QtBot)
 
 
 def test_closing_ends_every_job_even_one_that_waits_for_the_window(desk: Desk) -> None:
-    box: list[Any] = []
     begun = threading.Event()
 
     def ask(progress: Any, cancelled: Any) -> None:
         begun.set()
-        desk.jobs.on_window(box[0], lambda: None)
+        desk.jobs.on_window(lambda: None)
 
-    box.append(desk.jobs.start("Ask", lambda p, c: (time.sleep(0.02), ask(p, c)), lambda result: None))
+    desk.jobs.start("Ask", ask, lambda result: None)
     for _ in range(3):
         desk.jobs.start("Wait", _until_cancelled, lambda result: None)
     assert begun.wait(5.0)
