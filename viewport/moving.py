@@ -26,6 +26,7 @@ from viewport.near_side import (
     stands_for,
     turned_to,
 )
+from viewport.neighbours import Neighbours
 from viewport.patch import Patch
 from viewport.renderer import Renderer, camera_uniforms, light_directions, light_uniforms
 from viewport.ribbons import far_to_near
@@ -57,6 +58,8 @@ class Moving:
         self.patch = Patch(ctx, renderer.ribbons)
         self.touched: list[tuple[np.ndarray, np.ndarray]] = []  # arrays and their rows changed since the last picture
         self._moved: list[NDArray[np.bool_]] = []  # since the finished picture, of every coat
+        self._opened: list[NDArray[np.bool_]] = []  # where they were is a hole
+        self._neighbours: list[Neighbours] = []
         self._guides_moved: list[NDArray[np.bool_]] = []
         self._last_guides: list[GuideLines] = []
         self._box = np.zeros(4)  # around all that moved since: left, top, right, bottom, pixels
@@ -119,6 +122,8 @@ class Moving:
         if patch.number != picture[1]:
             patch.start(*picture)
             self._moved = [np.zeros(len(coat.points), bool) for coat in scene.coats]
+            self._opened = [moved.copy() for moved in self._moved]
+            self._neighbours = [Neighbours(coat, drawn, camera) for coat, drawn in self._sparse]
             self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
             self._last_guides = [drawable.lines for drawable in renderer.guides]
             self._box = np.array([np.inf, np.inf, -np.inf, -np.inf])
@@ -131,6 +136,9 @@ class Moving:
                 new = np.unique(np.concatenate(rows))
                 new = new[~self._moved[i][new]]
                 self._moved[i][new] = True
+                around = self._neighbours[i].around(new)
+                new = np.union1d(new, around[~self._opened[i][around]])
+                self._opened[i][new] = True
                 new = new[turned_to(camera, roots_of(coat.points)[new], coat.normals[new])]
                 patch.open(renderer.coats[i].textures, new, self.base, matrix)
                 self._box = grown_box(self._box, coat.points, new, camera, size)

@@ -9,6 +9,8 @@ from core.camera import project
 from core.workspace import ViewOptions
 from tests.viewport.scenes import FLAT, camera, hairs, quad
 from viewport.moving import changed_guides
+from viewport.near_side import sparse_coat
+from viewport.neighbours import Neighbours
 from viewport.scene import GuideLines, Scene
 from viewport.view import View3D
 
@@ -154,3 +156,40 @@ def test_a_new_camera_or_coat_gives_the_patch_up(stroke):
 
     before, after = stroke(Scene((quad(),), (coat,)), replaced)
     assert (np.abs(after - before).max(axis=2) > 0).mean() > 0.2, "all of it was drawn anew"
+
+
+def test_hairs_that_are_not_yet_evaluated_leave_with_those_that_are(stroke):
+    """A sparse part of the coat is combed, as a live coat does it: nothing of the old coat stays between its hairs."""
+    coat = field(12_000)
+    rows, push = brushed(coat, radius=0.3, push=0.06)
+    first = coat.order[:800]
+    evaluated = np.intersect1d(rows, first)
+    u = np.linspace(0.0, 1.0, 8, dtype=np.float32)
+
+    def comb(scene):
+        coat.points[evaluated, 0] += push * u
+        return scene, coat.points, evaluated
+
+    before, after = stroke(Scene((quad(),), (coat,)), comb, count=800)
+    y, x = np.mgrid[:H, :W]
+    at = project(camera(), np.array([[0.3, 0.2, 0.0], [0.5, 0.2, 0.0], [0.9, 0.2, 0.0]]), W, H).xy
+    away = np.hypot(x - at[0, 0], y - at[0, 1])
+    same_as_before = np.abs(after - before).max(axis=2) <= 1
+    assert same_as_before[away < at[1, 0] - at[0, 0]].mean() < 0.12
+    assert same_as_before[away > at[2, 0] - at[0, 0]].all()
+
+
+def test_neighbours_are_those_a_sparse_hair_stands_for():
+    coat = field(4000)
+    drawn = sparse_coat(coat, camera(), 100, (W, H))
+    neighbours = Neighbours(coat, drawn, camera())
+    roots = coat.points[:, :, 0].astype(float)
+    one = drawn.order[:1]
+    spacing = np.sort(np.linalg.norm(roots[drawn.order] - roots[one], axis=1))[3]
+    away = np.linalg.norm(roots - roots[one], axis=1)
+    found = neighbours.around(one)
+    assert np.array_equal(np.sort(found), np.flatnonzero(away <= 1.3 * spacing))
+    everything = neighbours.around(drawn.order)
+    assert len(np.unique(everything)) > 0.9 * 4000
+    assert len(Neighbours(coat, sparse_coat(coat, camera(), 4000, (W, H)), camera()).around(one)) == 0, "all are drawn"
+    assert len(neighbours.around(np.zeros(0, np.int32))) == 0
