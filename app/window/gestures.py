@@ -253,9 +253,12 @@ class Gestures:
             self.held = ""
 
     def leave(self) -> None:
-        """The window lost the keyboard: no key is held any more, and no stroke hangs."""
+        """The window lost the keyboard: no key is held any more. What a button holds goes on until it is released."""
         self.held = ""
-        if self._button is not None or self.stroke is not None:
+
+    def all_up(self) -> None:
+        """No button is down: a release that never came is made up for."""
+        if self.drag is not None and self._button is not None:
             self.finish()
 
     def overlays(self) -> Overlays:

@@ -403,7 +403,7 @@ class MainWindow(QMainWindow):
         self.top.take_look()
         self.hotkeys.take_look()
         self.status.show_hint()
-        self.viewport.update()
+        self.viewport.repaint_soon()
 
     def _preferences_gone(self) -> None:
         self._preferences = None
@@ -439,7 +439,7 @@ class MainWindow(QMainWindow):
 
 
 def fresh_workspace() -> Workspace:
-    """Where a new document begins: with the comb, the coat seen as it is; guides show themselves when they are meant."""
+    """Where a new document begins: with the comb, the coat as it is; guides show themselves when they are meant."""
     return Workspace(tool="comb", panels=tuple(PANELS), view=ViewOptions(guides=False))
 
 

@@ -80,6 +80,7 @@ class Viewport(QOpenGLWindow):
         self._ctx: moderngl.Context | None = None
         self._screen: moderngl.Framebuffer | None = None
         self._stale = True
+        self._wants_paint = True
         self._moved = False  # the picture being painted was drawn anew
         self._pointer: Pointer | None = None
         self._pen = False  # the pen is down: what the system makes of it as a mouse is no event of its own
@@ -101,11 +102,21 @@ class Viewport(QOpenGLWindow):
         ratio = self.devicePixelRatio()
         return max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
 
+    def repaint_soon(self) -> None:
+        """Paint once more, what is drawn or what lies over it."""
+        self._wants_paint = True
+        self.update()
+
     def redraw(self) -> None:
         """Something that is shown has changed."""
         self._stale = True
         self._rest.stop()
-        self.update()
+        self.repaint_soon()
+
+    @property
+    def pending(self) -> bool:
+        """True while something that has happened is not on the screen yet."""
+        return self._stale or self._wants_paint
 
     @property
     def at_rest(self) -> bool:
@@ -158,6 +169,7 @@ class Viewport(QOpenGLWindow):
 
     def paintGL(self) -> None:
         """One picture: drawn anew when something changed, else the one there is with the ring over it."""
+        self._wants_paint = False
         if self.picture is None or self._screen is None:
             return
         picture, drawing = self.picture, self._stale
@@ -198,12 +210,12 @@ class Viewport(QOpenGLWindow):
         more = picture.rest(self.eye.camera)
         if picture.view.picture_changed:
             self.refined_frames += 1
-            self.update()
+            self.repaint_soon()
         if more:
             self._rest.start(0)
         elif picture.settled:
             self._hud = (0.0, [])
-            self.update()
+            self.repaint_soon()
             self.settled.emit()
 
     def _start_job(self, job: Job, done: Callable[[Done], None], failed: Callable[[Exception], None]) -> None:
@@ -260,7 +272,7 @@ class Viewport(QOpenGLWindow):
             self.redraw()
         else:
             self._hud = (0.0, [])
-            self.update()
+            self.repaint_soon()
 
     def _session_replaced(self) -> None:
         self.gestures.drag = None
@@ -287,7 +299,7 @@ class Viewport(QOpenGLWindow):
                 return True
         elif kind == QEvent.Type.Leave:
             self._pointer = None
-            self.update()
+            self.repaint_soon()
         elif kind == QEvent.Type.Enter:
             self._take_focus()
         elif kind == QEvent.Type.NativeGesture and isinstance(event, QNativeGestureEvent):
@@ -298,7 +310,7 @@ class Viewport(QOpenGLWindow):
         """Shown or hidden: go on finishing, or stop."""
         super().exposeEvent(event)
         if self.isExposed():
-            self.update()
+            self.repaint_soon()
         else:
             self._rest.stop()
 
@@ -322,6 +334,8 @@ class Viewport(QOpenGLWindow):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """The mouse moved."""
         if not self._pen:
+            if event.buttons() == Qt.MouseButton.NoButton:
+                self.gestures.all_up()
             self._move(mouse_pointer(event, self.devicePixelRatio()), event.globalPosition().toPoint())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -364,7 +378,7 @@ class Viewport(QOpenGLWindow):
         ):
             self._change_modifiers(event.modifiers())
             event.ignore()
-        self.update()
+        self.repaint_soon()
 
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         """A key goes up."""
@@ -373,9 +387,8 @@ class Viewport(QOpenGLWindow):
             self._change_modifiers(QGuiApplication.queryKeyboardModifiers())
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Without the keyboard nothing may hang."""
-        if self.gestures.radial is None:
-            self.gestures.leave()
+        """Without the keyboard no key is held."""
+        self.gestures.leave()
         super().focusOutEvent(event)
 
     def _press(self, button: str, modifiers: Qt.KeyboardModifier, pointer: Pointer, place: QPoint) -> None:
@@ -387,7 +400,7 @@ class Viewport(QOpenGLWindow):
         if isinstance(drag, CameraDrag):
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
         self._rest.stop()
-        self.update()
+        self.repaint_soon()
 
     def _move(self, pointer: Pointer, place: QPoint) -> None:
         self._pointer = pointer
@@ -395,7 +408,7 @@ class Viewport(QOpenGLWindow):
             self.gestures.radial.point_to(place)
             return
         self.gestures.move(pointer)
-        self.update()
+        self.repaint_soon()
 
     def _release(self, button: str) -> None:
         if self.gestures.radial is not None:
@@ -404,7 +417,7 @@ class Viewport(QOpenGLWindow):
         self.gestures.release(button)
         if self.gestures.drag is None:
             self.unsetCursor()
-        self.update()
+        self.repaint_soon()
 
     def _frame(self) -> None:
         stroking = self.gestures.stroke is not None
@@ -426,7 +439,7 @@ class Viewport(QOpenGLWindow):
         if self._pointer is not None:
             names = modifier_names(modifiers)
             self._pointer = self._pointer._replace(shift="Shift" in names, ctrl="Ctrl" in names, alt="Alt" in names)
-            self.update()
+            self.repaint_soon()
 
     def _take_focus(self) -> None:
         """Keys go where the hand is, unless something is being typed."""

@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
-from pytestqt.qtbot import QtBot
 
-from tests.documents import small_document
-from tests.window.host import Host
+from tests.display import ensure_display
+
+OFFSCREEN = ensure_display()  # before anything of Qt is made
+
+from pytestqt.qtbot import QtBot  # noqa: E402
+
+from app.window.main import MainWindow, fresh_workspace  # noqa: E402
+from app.window.settings import Settings  # noqa: E402
+from core.demo import demo_document  # noqa: E402
+from core.document import Document  # noqa: E402
+from core.evaluator import Evaluator  # noqa: E402
+from core.formats.journal import Journal  # noqa: E402
+from tests.documents import small_document  # noqa: E402
+from tests.window.hand import Hand  # noqa: E402
+from tests.window.host import Host  # noqa: E402
+from tools.session import Session  # noqa: E402
+
+Opened = Callable[..., Hand]
 
 
 @pytest.fixture
@@ -22,3 +39,52 @@ def host(qtbot: QtBot) -> Iterator[Host]:
     host.close()
     host.desk.session.close(discard=True)
     host.deleteLater()
+
+
+@pytest.fixture(scope="session")
+def animal() -> Document:
+    """The demo animal with few guides and hairs."""
+    evaluator = Evaluator()
+    document = demo_document(evaluator, hairs=4000, guides=400)
+    evaluator.close()
+    return document
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Preferences and journals of this test alone."""
+    monkeypatch.setenv("FILOPLUME_STATE", str(tmp_path / "journals"))
+    monkeypatch.setenv("FILOPLUME_SETTINGS", str(tmp_path / "settings"))
+    return tmp_path
+
+
+@pytest.fixture
+def opened(qtbot: QtBot, home: Path) -> Iterator[Opened]:
+    """Opens real main windows: ``opened(document, keymap="maya")`` gives a hand at one."""
+    if OFFSCREEN is not None or os.environ.get("QT_QPA_PLATFORM") == "offscreen":
+        pytest.skip(OFFSCREEN or "windows are offscreen")
+    windows: list[MainWindow] = []
+
+    def open_one(document: Document | None = None, **settings: object) -> Hand:
+        session = Session(document, fresh_workspace(), journal=Journal())
+        window = MainWindow(session, Settings(**settings))  # type: ignore[arg-type]
+        window.resize(900, 640)
+        windows.append(window)
+        window.show()
+        qtbot.waitExposed(window)
+        hand = Hand(window, qtbot)
+        if document is not None and document.meshes:
+            qtbot.waitUntil(lambda: window.viewport.isExposed(), timeout=10_000)
+            hand.rest()
+        return hand
+
+    yield open_one
+    for window in windows:
+        window.close()
+        qtbot.wait(1)
+
+
+@pytest.fixture
+def hand(opened: Opened, animal: Document) -> Hand:
+    """A hand at a window with the animal in it."""
+    return opened(animal)

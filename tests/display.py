@@ -1,0 +1,37 @@
+"""A display for tests of windows: the one there is, or an Xvfb with a window manager that ends with the tests."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import subprocess
+
+SIZE = "1920x1200x24"
+
+
+def ensure_display() -> str | None:
+    """See to it that windows can be opened. None when they can, else why only "offscreen" ones can be."""
+    if os.environ.get("DISPLAY") or os.environ.get("QT_QPA_PLATFORM"):
+        return None if os.environ.get("QT_QPA_PLATFORM") != "offscreen" else "windows are offscreen"
+    server = shutil.which("Xvfb")
+    if server is None:
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+        return "there is no display and no Xvfb: sudo apt install xvfb openbox"
+    read, write = os.pipe()
+    command = [server, "-displayfd", str(write), "-screen", "0", SIZE, "-nolisten", "tcp"]
+    process = subprocess.Popen(command, pass_fds=(write,), stderr=subprocess.DEVNULL)
+    os.close(write)
+    with os.fdopen(read) as told:
+        number = told.readline().strip()
+    atexit.register(_end, process)
+    os.environ["DISPLAY"] = f":{number}"
+    manager = shutil.which("openbox")
+    if manager is not None:
+        atexit.register(_end, subprocess.Popen([manager], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+    return None
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    process.wait(10)
