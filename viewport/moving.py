@@ -50,6 +50,7 @@ class Moving:
         self._behind_key: tuple[Any, ...] | None = None
         self._across: dict[int, float] = {}
         self._hairs = 0
+        self._camera: Camera | None = None
         self._base_key: tuple[Any, ...] | None = None
         self._sparse_key: tuple[Any, ...] | None = None
         self._light_key: tuple[Any, ...] | None = None
@@ -68,8 +69,10 @@ class Moving:
 
     def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
         """Rows of an array of the scene were written to in place: gather again what is drawn of it."""
+        camera = self._camera
         self._sparse = [(c, sparse_points(c, drawn) if c.points is points else drawn) for c, drawn in self._sparse]
-        self._near = [(g, near_guides(g, self._camera) if g.points is points else near) for g, near in self._near]
+        if camera is not None:
+            self._near = [(g, near_guides(g, camera) if g.points is points else near) for g, near in self._near]
         self.touched.append((points, rows))
 
     def draw(
@@ -114,19 +117,25 @@ class Moving:
     def _strands_across(self, drawable: CoatDrawable | GuideDrawable) -> float:
         return self._across.get(id(_shown(drawable)), 1.0)
 
+    def keep(self, scene: Scene, camera: Camera, picture: tuple[DisplayTarget, int]) -> None:
+        """Keep a finished picture of the scene last drawn; done at rest it need not be done in a stroke."""
+        if not same((tuple(coat for coat, _ in self._sparse), self._camera), (scene.coats, camera)):
+            return
+        self.patch.start(*picture)
+        self._moved = [np.zeros(len(coat.points), bool) for coat in scene.coats]
+        self._opened = [moved.copy() for moved in self._moved]
+        self._neighbours = [Neighbours(coat, drawn, camera) for coat, drawn in self._sparse]
+        self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
+        self._last_guides = [drawable.lines for drawable in self.renderer.guides]
+        self._box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+
     def _patched(
         self, scene: Scene, camera: Camera, picture: tuple[DisplayTarget, int], matrix: np.ndarray
     ) -> DisplayTarget:
         """The finished picture with holes where hairs and guides have moved since, from and to."""
         patch, renderer = self.patch, self.renderer
         if patch.number != picture[1]:
-            patch.start(*picture)
-            self._moved = [np.zeros(len(coat.points), bool) for coat in scene.coats]
-            self._opened = [moved.copy() for moved in self._moved]
-            self._neighbours = [Neighbours(coat, drawn, camera) for coat, drawn in self._sparse]
-            self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
-            self._last_guides = [drawable.lines for drawable in renderer.guides]
-            self._box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+            self.keep(scene, camera, picture)
         size = picture[0].color.size
         assert self.base is not None
         assert patch.target is not None

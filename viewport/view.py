@@ -200,6 +200,8 @@ class View3D:
             self._finished_number += 1
             self.picture_changed = True
         yield 1.0
+        self.moving.keep(scene, self.camera, (self._targets[0], self._finished_number))
+        yield 1.0
 
     def present(
         self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], overlays: Sequence[Overlay] = (),
