@@ -10,6 +10,7 @@ from core.errors import UserError
 from core.field import field
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
+from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
 from core.record import Record, number, text
 
@@ -23,12 +24,14 @@ class MeshObject(Record):
 
     id : stable, unique in the document.
     rig : what moves it, or None for a mesh at rest.
+    correctives : what was sculpted at poses of the rig, or None.
     """
 
     id: int
     name: str
     mesh: Mesh
     rig: Rig | None = None
+    correctives: Correctives | None = None
     hidden: Annotated[bool, field(
         "Hidden", "Leaves the mesh and its hair out of the view; they stay in the document and its files.",
     )] = False
@@ -41,6 +44,8 @@ class MeshObject(Record):
         number(self, "id", least=0, most=2**31 - 1)
         if self.rig is not None and len(self.rig.skin.joints) != len(self.mesh.points):
             raise ValueError(f"MeshObject.rig moves {len(self.rig.skin.joints)} vertices of {len(self.mesh.points)}")
+        if self.correctives is not None and self.correctives.vertex_count > len(self.mesh.points):
+            raise ValueError("MeshObject.correctives correct a vertex that the mesh does not have")
 
 
 class Document(Record):
