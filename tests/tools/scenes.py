@@ -57,7 +57,7 @@ def rig() -> Rig:
     angle = np.linspace(0.0, 1.2, frames)
     rotations = np.zeros((frames, 2, 4), np.float32)
     rotations[:, 0, 3] = 1.0
-    axis = np.array([1.0, 0.4, 0.2]) / np.linalg.norm([1.0, 0.4, 0.2])
+    axis = np.array([0.6, 0.3, 0.8]) / np.linalg.norm([0.6, 0.3, 0.8])
     rotations[:, 1, :3] = np.sin(0.5 * angle)[:, None] * axis
     rotations[:, 1, 3] = np.cos(0.5 * angle)
     eye = np.tile(np.eye(4), (2, 1, 1))
