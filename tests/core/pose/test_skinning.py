@@ -5,9 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
+from core.pose.clip import local_matrices
 from core.pose.rig import Rig
 from core.pose.skeleton import Clip, Skeleton, SkinWeights
-from core.pose.skinning import local_matrices, object_matrices, posed_points, skin_matrices
+from core.pose.skinning import object_matrices, posed_points, skin_matrices
 from core.transform import compose, transform_points
 from core.workers import Workers
 
