@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import gc
+
 import moderngl
 import numpy as np
 import pytest
 
 from core.camera import Camera, look_at
 from core.overlay import Circle, Label, Marker, Polyline
+from viewport.context import collect
 from viewport.hud import KEPT_WORDS, ScreenImages, plain_text
 from viewport.overlay_drawing import HALO_WIDTH, TONES, MarkDrawing, Words, axes_marks, labels, marks
 
@@ -123,6 +126,8 @@ def test_words_stand_at_their_place_and_are_made_once(ctx):
     for number in range(KEPT_WORDS + 20):
         images.draw_words([Words(0.0, 20.0, str(number), (9, 9, 9))], 12.0, (W, H))
     assert len(images.words) == KEPT_WORDS
+    gc.collect()
+    assert collect(ctx) == 0, "words nobody shows any more are released"
     assert not any(isinstance(texture.mglo, moderngl.InvalidObject) for texture in images.words.values())
     for thing in (images, target, color):
         thing.release()

@@ -120,7 +120,14 @@ def test_the_grid_has_lines_on_the_ground_and_hides_behind_things(picture):
     for point in on_axes:
         y, x = pixel(cam, point)
         assert gained[y - 1 : y + 2, x - 1 : x + 2].max() > 30
-    assert gained[pixel(cam, (0.1, 0.2, 0.0))] <= 1
+    small = quad(z=0.0, half=1e-3)  # so that the ground lies in the same place
+    free = np.abs(picture(Scene((small,)), cam, BARE.replace(grid=True), 2) - picture(Scene((small,)), cam, samples=2))
+    corners = np.array([[-0.28, -0.28, 0.0], [0.28, -0.28, 0.0], [0.28, 0.28, 0.0], [-0.28, 0.28, 0.0]])
+    inside = np.zeros((H, W), np.uint8)
+    cv2.fillConvexPoly(inside, np.rint(project(cam, corners, W, H).xy).astype(np.int32), 1)
+    upper = inside.astype(bool) & (np.arange(H)[:, None] < pixel(cam, (0.0, 0.05, 0.0))[0])
+    assert free.max(axis=2)[upper].max() > 10, "there are lines behind it"
+    assert gained[upper].max() <= 1
     red, blue = grid[pixel(cam, on_axes[0])], grid[pixel(cam, on_axes[2])]
     assert red[0] > red[2] + 15
     assert blue[2] > blue[0] + 15
