@@ -127,20 +127,22 @@ class Scene(NamedTuple):
 
 
 def thinned(coat: Coat, most: int) -> Coat:
-    """The coat with at most `most` hairs: every second, third ... row.
+    """The coat with at most `most` hairs: a half, a third ... of those shown.
 
     They are made wider, between what keeps the look of one hair and what keeps the cover of all. Rows of
-    grown coats are sorted by place, so that equal steps leave an even coat.
+    grown coats are sorted by place, so that equal steps leave an even coat where no order is known.
     """
-    step = -(-len(coat.points) // max(most, 1))
+    shown = len(coat.points) if coat.order is None else len(coat.order)
+    step = -(-shown // max(most, 1))
     if step <= 1:
         return coat
+    rows = np.arange(0, shown, step) if coat.order is None else np.sort(coat.order[: shown // step])
     look, wider = coat.look, step**0.75
     return Coat(
-        np.ascontiguousarray(coat.points[::step]), np.asarray(coat.ids)[::step], coat.normals[::step],
+        coat.points[rows], np.asarray(coat.ids)[rows], coat.normals[rows],
         look._replace(root_width=look.root_width * wider, tip_width=look.tip_width * wider),
-        None if coat.tints is None else coat.tints[::step],
-        None if coat.widths is None else coat.widths[::step],
+        None if coat.tints is None else coat.tints[rows],
+        None if coat.widths is None else coat.widths[rows],
     )
 
 

@@ -50,6 +50,9 @@ def test_a_thinned_coat_keeps_ids_and_looks_alike(ctx):
     skin, coat = ball(count=20000, look=look)
     few = thinned(coat, 7000)
     assert thinned(coat, 20000) is coat
+    order = np.random.default_rng(1).permutation(20000)[:9000].astype(np.int32)
+    shown = thinned(coat._replace(order=order), 4500)
+    assert np.array_equal(shown.ids, np.sort(order[:4500])), "of the hairs that are shown, the first by rank"
     assert len(few.points) == len(few.ids) == len(few.normals) == 6667
     assert np.array_equal(few.points[5], coat.points[15])
     assert few.ids[5] == coat.ids[15]
