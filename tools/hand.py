@@ -23,7 +23,7 @@ from core.overlay import Circle, Overlays
 from core.posed import skin_at
 from core.workspace import Respect
 from tools.pen import Pen, PenSettings
-from tools.pose import back_to_rest, in_pose
+from tools.pose import BackToRest, in_pose
 from tools.respect import respected, restored
 from tools.ring import RingParams, ring_radius
 from tools.tool import Ground, Picks, Pointer, Sight, Stroke, Tool
@@ -62,6 +62,7 @@ class Hand:
         self._guides: Guides | None = None
         self._batches: list[tuple[Pointer, ...]] = []
         self._record: StrokeRecord | None = None
+        self._back: BackToRest | None = None
         self._ground: tuple[tuple[Any, ...], tuple[Ground, ...]] | None = None
 
     @property
@@ -244,13 +245,15 @@ class Hand:
             return document
         before = ground.groom.guides
         if not self._tool.at_rest and ground.skin is not ground.rest:
-            guides = back_to_rest(guides, ground.guides, before, ground.skin)
+            if self._back is None:
+                self._back = BackToRest(ground.guides, before, ground.skin)
+            guides = self._back(guides)
         guides = restored(before, guides, self.session.workspace.respect, self._tool.edits)
         groom: Groom = ground.groom.replace(guides=guides)
         return with_groom(document, groom)
 
     def _drop(self) -> None:
-        self._tool, self._guides, self._record = None, None, None
+        self._tool, self._guides, self._record, self._back = None, None, None, None
         self._strokes, self._batches = [], []
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from core.groom.guides import Guides
+from core.mesh.roots import Roots
 from core.mesh.skin import Skin
 from core.mesh.surface import rest_from_posed, root_frames, strands_on_deformed
 from core.record import freeze
@@ -22,33 +21,58 @@ def in_pose(guides: Guides, skin: Skin) -> Guides:
     return guides.replace(points=freeze(points), roots=guides.roots.replace(frames=freeze(frames)))
 
 
-def back_to_rest(guides: Guides, shown: Guides, before: Guides, skin: Skin) -> Guides:
-    """Guides edited on a pose as they stand at rest.
+class BackToRest:
+    """The way back of one stroke: guides edited on a pose as they stand at rest.
 
-    Those that were not touched keep their bits, all of them their roots.
+    Those that were not touched keep their bits, all of them their roots. What was carried for one preview is not
+    carried again for the next.
 
     Parameters
     ----------
-    guides : edited. shown : as they were in the pose before the edit. before : as they were at rest.
-    skin : of the pose.
+    shown : as they were in the pose before the edit. before : as they were at rest. skin : of the pose.
     """
-    if guides.roots is shown.roots and guides.points is shown.points:
-        return guides.replace(points=before.points, roots=before.roots)
-    if len(guides) == 0:
-        return guides.replace(roots=before.roots.take(np.zeros(0, np.intp)))
-    there, row = rows_of(before.ids, guides.ids)
-    if not there.all():
-        raise ValueError("a tool that plants works at rest: set at_rest")
-    whole = guides.ids is before.ids
-    roots = before.roots if whole else before.roots.take(row)
-    same_count = guides.points.shape[1] == shown.points.shape[1]
-    moved: NDArray[Any]
-    if same_count:
-        points = before.points.copy() if whole else before.points[row]
-        moved = changed_rows(shown.points if whole else shown.points[row], guides.points)
-    else:
+
+    def __init__(self, shown: Guides, before: Guides, skin: Skin) -> None:
+        self.shown, self.before, self.skin = shown, before, skin
+        self._posed, self._rest = shown.points, before.points  # of one shape, the newest known to belong together
+
+    def __call__(self, guides: Guides) -> Guides:
+        """Edited guides of the pose at rest."""
+        if guides.roots is self.shown.roots and guides.points.shape == self.shown.points.shape:
+            return guides.replace(points=self._carried(guides), roots=self.before.roots)
+        return self._rearranged(guides)
+
+    def _carried(self, guides: Guides) -> NDArray[np.float32]:
+        if guides.points is self.shown.points:
+            return self.before.points
+        moved = changed_rows(self._posed, guides.points)
+        now = guides.points[moved]
+        rest = self._back(self.before.roots.take(moved), now)
+        rest[:, 0] = self.before.points[moved, 0]
+        points = self._rest.copy()
+        points[moved] = rest
+        # a strand that came back to where it was has its old bits again
+        back = np.delete(moved, changed_rows(self.shown.points[moved], now))
+        points[back] = self.before.points[back]
+        self._posed, self._rest = guides.points, freeze(points)
+        return self._rest
+
+    def _rearranged(self, guides: Guides) -> Guides:
+        """Where guides went, or have another number of points."""
+        before, shown = self.before, self.shown
+        if len(guides) == 0:
+            return guides.replace(roots=before.roots.take(np.zeros(0, np.intp)))
+        there, row = rows_of(before.ids, guides.ids)
+        if not there.all():
+            raise ValueError("a tool that plants works at rest: set at_rest")
+        roots, moved = before.roots.take(row), np.arange(len(guides), dtype=np.int32)
         points = np.empty(guides.points.shape, np.float32)
-        moved = np.arange(len(guides))
-    points[moved] = rest_from_posed(skin.mesh, roots.take(moved), guides.points[moved], skin.points, skin.normals)
-    points[:, 0] = before.points[row, 0]
-    return guides.replace(points=freeze(points), roots=roots)
+        if guides.points.shape[1] == shown.points.shape[1]:
+            points[:] = before.points[row]
+            moved = changed_rows(shown.points[row], guides.points)
+        points[moved] = self._back(roots.take(moved), guides.points[moved])
+        points[:, 0] = before.points[row, 0]
+        return guides.replace(points=freeze(points), roots=roots)
+
+    def _back(self, roots: Roots, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        return rest_from_posed(self.skin.mesh, roots, points, self.skin.points, self.skin.normals)
