@@ -15,6 +15,7 @@ from PySide6.QtCore import QMessageLogContext, QProcess, Qt, QTimer, QtMsgType, 
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
+from app.window.garbage import Garbage
 from app.window.settings import LoadedSettings, load_settings
 from app.window.theme import apply, load_theme, look_of
 from core.errors import UserError
@@ -77,7 +78,9 @@ def run(wish: Wish) -> int:
     apply(application, load_theme(loaded.settings.theme), loaded.settings.text_size)
     frame = StartFrame(wish, loaded)
     frame.show()
+    garbage = Garbage(application)
     code = application.exec()
+    garbage.stop()
     reason = frame.failed
     frame.deleteLater()
     if reason:
