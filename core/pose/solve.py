@@ -101,7 +101,7 @@ def solve_centres(
     count = len(centres)
     squared = _squared_distances(centres, centres, each)
     _refuse_twins(squared, names)
-    if settings.kernel == "shepard":
+    if settings.kernel == "shepard" or count == 1:  # of one centre the weight is 1 everywhere
         exact = np.zeros(count)
         return Solved(dofs, settings, names, silent, centres, each, None, None, 1.0, exact)
     phi = kernel(settings.kernel, centres.shape[1], settings.table)
@@ -113,7 +113,7 @@ def solve_centres(
     system = _system(matrix, centres, plane, settings.smoothing)
     if not symmetric:
         _refuse_turned(matrix, system, centres, usual, phi, plane, settings, names)
-    inverse, least = _inverse(system, symmetric, names)
+    inverse, least = _inverse(system, names)
     if symmetric and settings.table and settings.kernel in POSITIVE and np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise Refusal("singular", names, "the table of the kernel is too coarse for them; give it more entries")
     inverse = inverse[:, :count]
@@ -173,21 +173,17 @@ def _system(matrix: Array, centres: Array, plane: Plane | None, smoothing: float
     return system
 
 
-def _inverse(system: Array, symmetric: bool, names: tuple[str, ...]) -> tuple[Array, float]:
+def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float]:
     """The inverse and the reciprocal condition, from one decomposition."""
-    if symmetric:
-        values, right = np.linalg.eigh(system)
-        left, sizes = right, np.abs(values)
-    else:
-        left, sizes, right_rows = np.linalg.svd(system)
-        values, right = sizes, right_rows.T
+    left, sizes, right = np.linalg.svd(system)
+    right = right.T
     largest = sizes.max()
     least = float(sizes.min() / largest) if largest > 0.0 else 0.0
     if not least >= LEAST_CONDITION:
         # all directions that are lost, not one of them: three poses in one place lose two
         lost = right[: len(names), sizes < max(LEAST_CONDITION * largest, 2.0 * sizes.min())]
         raise Refusal("singular", _guilty(np.linalg.norm(lost, axis=1), names))
-    return (right / values) @ left.T, least
+    return (right / sizes) @ left.T, least
 
 
 def _refuse_twins(squared: Array, names: tuple[str, ...]) -> None:

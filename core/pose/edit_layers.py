@@ -1,0 +1,239 @@
+"""Edits of layers after they are made: add, delete, merge and move poses, extract again, and see who disturbs whom."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import UserError
+from core.pose.controls import rests
+from core.pose.layers import Extracted, LayerReport, anchors_of, extract_layer, space_dofs
+from core.pose.pose import Pose, moved_controls
+from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
+from core.pose.refusal import Refusal
+from core.pose.rig import Rig
+from core.pose.synthesis import Prepared, evaluate, prepare, prepare_layer, run_weights
+from core.record import freeze
+from core.transform import Array
+
+
+def refresh(points: NDArray[np.float32], rig: Rig, correctives: Correctives, first: int = 0) -> Extracted:
+    """Extract layers `first` and on again from their target surfaces, in order, each upon those below.
+
+    Raises
+    ------
+    Refusal
+        Naming the poses that cannot be told apart.
+    """
+    ready: list[Prepared] = []
+    layers: list[PoseLayer] = []
+    reports: list[LayerReport] = []
+    for i, layer in enumerate(correctives.layers):
+        if i >= first:
+            below = [s.pose for lower in layers for s in lower.space.samples]
+            space = layer.space.replace(anchors=anchors_of(layer.space, below))
+            targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
+            layer, report = extract_layer(
+                points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer)
+            reports.append(report)
+        layers.append(layer)
+        if layer.enabled:
+            ready.append(prepare_layer(layer, rig))
+    return Extracted(Correctives(layers=tuple(layers)), tuple(reports))
+
+
+def add_sculpt(
+    points: NDArray[np.float32], rig: Rig, correctives: Correctives, pose: Pose, target: NDArray[Any],
+    falloffs: Mapping[str, Falloff] | None = None, dofs: Sequence[Dof] | None = None, **options: Any,
+) -> Extracted:
+    """Correctives with one more sculpt (or a sculpt anew, when its pose has the name of one).
+
+    It joins the space that moves the same controls; else a new space begins, below those that move more controls
+    beside these. Only vertices it moves become its own. Later layers are extracted again.
+
+    Parameters
+    ----------
+    target : (V, 3), the surface as sculpted, object space.
+    options : fields of a new :class:`PoseSpace`.
+    """
+    controls = moved_controls(pose, rests(rig))
+    if not controls:
+        raise Refusal("duplicate", (REST_NAME, pose.name))
+    old = find_pose(correctives, pose.name)
+    if old is not None:
+        correctives = without_pose(correctives, pose.name)
+    sample = PoseSample(pose=pose, falloffs=dict(falloffs or {}))
+    layers = list(correctives.layers)
+    at = next((i for i, layer in enumerate(layers) if layer.space.controls == controls), None)
+    if at is None:
+        above = (i for i, layer in enumerate(layers) if set(layer.space.controls) > set(controls))
+        at = next(above, len(layers))
+        space = PoseSpace(dofs=space_dofs(rig, [pose], controls, dofs), samples=(sample,), **options)
+        layers.insert(at, _layer(_free_name(layers, controls), space, np.arange(len(points), dtype=np.int32)))
+        layer = layers[at]
+    else:
+        layer = layers[at]
+        layer = _with_all_vertices(layer, len(points))
+        layer = _resampled(layer, (*layer.space.samples, sample), [*range(len(layer.space.samples)), None])
+    targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
+    targets[-1] = np.asarray(target, np.float32)[layer.vertices]
+    ready = prepare(Correctives(layers=tuple(layers[:at])), rig)
+    below = [s.pose for lower in layers[:at] for s in lower.space.samples]
+    space = layer.space.replace(anchors=anchors_of(layer.space, below))
+    layers[at], report = extract_layer(
+        points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer)
+    rest = refresh(points, rig, Correctives(layers=tuple(layers)), at + 1)
+    return Extracted(rest.correctives, (report, *rest.reports))
+
+
+def find_pose(correctives: Correctives, name: str) -> tuple[int, int] | None:
+    """The layer and the place in it of a sculpted pose, or None."""
+    for i, layer in enumerate(correctives.layers):
+        for k, sample in enumerate(layer.space.samples):
+            if sample.name == name:
+                return i, k
+    return None
+
+
+def without_pose(correctives: Correctives, name: str) -> Correctives:
+    """Correctives without that pose; a layer without poses goes as well. `refresh` the rest."""
+    at, k = _place(correctives, name)
+    layer = correctives.layers[at]
+    keep = [i for i in range(len(layer.space.samples)) if i != k]
+    left = _resampled(layer, tuple(layer.space.samples[i] for i in keep), keep)
+    some = (left,) if keep else ()
+    changed: Correctives = correctives.replace(
+        layers=(*correctives.layers[:at], *some, *correctives.layers[at + 1 :]))
+    return changed
+
+
+def merged_poses(correctives: Correctives, names: Sequence[str]) -> Correctives:
+    """Correctives with poses of one layer as one, at the first of them, the sculpts averaged. `refresh` the rest."""
+    places = [_place(correctives, name) for name in names]
+    if len({i for i, _ in places}) != 1 or len(places) < 2:
+        raise UserError("Only poses of one layer can be merged; choose two or more of the same layer.")
+    at, chosen = places[0][0], [k for _, k in places]
+    layer = correctives.layers[at]
+    share = layer.moved[chosen].astype(np.float32)[..., None]
+    total = np.maximum(share.sum(axis=0), 1.0)
+    deltas, targets, moved = layer.deltas.copy(), layer.targets.copy(), layer.moved.copy()
+    deltas[chosen[0]] = (layer.deltas[chosen] * share).sum(axis=0) / total
+    targets[chosen[0]] = (layer.targets[chosen] * share).sum(axis=0) / total
+    moved[chosen[0]] = layer.moved[chosen].any(axis=0)
+    merged = layer.replace(deltas=freeze(deltas), targets=freeze(targets), moved=freeze(moved))
+    out: Correctives = correctives.replace(
+        layers=(*correctives.layers[:at], merged, *correctives.layers[at + 1 :]))
+    for name in names[1:]:
+        out = without_pose(out, name)
+    return out
+
+
+def moved_pose(
+    points: NDArray[np.float32], rig: Rig, correctives: Correctives, name: str, pose: Pose
+) -> Correctives:
+    """Correctives with a sample at another pose; its corrections stay, its target is what they give there.
+
+    `refresh` the rest.
+    """
+    at, k = _place(correctives, name)
+    layer = correctives.layers[at]
+    alone = layer.replace(
+        space=layer.space.replace(samples=(PoseSample(pose=pose),), anchors=(), kernel="gaussian", rest_falloffs={}),
+        kind="pose-space", enabled=True, moved=freeze(layer.moved[k : k + 1] | True),
+        deltas=freeze(layer.deltas[k : k + 1].copy()), targets=freeze(layer.targets[k : k + 1].copy()))
+    surface = evaluate(points, rig, Correctives(layers=(*correctives.layers[:at], alone)), pose)
+    targets = layer.targets.copy()
+    targets[k] = surface[layer.vertices]
+    samples = list(layer.space.samples)
+    samples[k] = samples[k].replace(pose=pose.replace(name=name))
+    changed = layer.replace(space=layer.space.replace(samples=tuple(samples)), targets=freeze(targets))
+    out: Correctives = correctives.replace(
+        layers=(*correctives.layers[:at], changed, *correctives.layers[at + 1 :]))
+    return out
+
+
+def cross_talk(points: NDArray[np.float32], rig: Rig, correctives: Correctives) -> tuple[tuple[str, ...], Array]:
+    """Who disturbs whom: names of all sculpted poses, and (N, N) float64 metres.
+
+    Entry (i, j) is how far the sculpt j moves any vertex at the pose i, before skinning, though i belongs to the same
+    layer or one below: 0 everywhere when every sculpt is met.
+    """
+    ready = prepare(correctives, rig)
+    owners = [(i, s.pose) for i, layer in enumerate(correctives.layers) for s in layer.space.samples]
+    first = np.cumsum([0, *(len(layer.space.samples) for layer in correctives.layers)])
+    table = np.zeros((len(owners), len(owners)))
+    for i, (lower, pose) in enumerate(owners):
+        for item in ready:
+            at = next(n for n, layer in enumerate(correctives.layers) if layer is item.layer)
+            if at < lower or not len(item.places):
+                continue
+            runs = run_weights(item, pose)
+            reach = np.abs(np.repeat(runs, np.diff(item.starts), axis=0)).T * np.linalg.norm(item.layer.deltas, axis=2)
+            table[i, first[at] : first[at + 1]] = reach.max(axis=1)
+        table[i, i] = 0.0
+    return tuple(pose.name for _, pose in owners), table
+
+
+def sculpt_errors(
+    points: NDArray[np.float32], rig: Rig, correctives: Correctives
+) -> dict[str, NDArray[np.float32]]:
+    """How far (n,) the surface at every sculpted pose is from the sculpt, at the vertices of its layer, metres."""
+    ready = prepare(correctives, rig)
+    out = {}
+    for layer in correctives.layers:
+        for k, sample in enumerate(layer.space.samples):
+            posed = evaluate(points, rig, correctives, sample.pose, prepared=ready)[layer.vertices]
+            out[sample.name] = np.linalg.norm(posed - layer.targets[k], axis=1)
+    return out
+
+
+def _place(correctives: Correctives, name: str) -> tuple[int, int]:
+    found = find_pose(correctives, name)
+    if found is None:
+        raise UserError(f"There is no sculpted pose {name!r}; choose one from the list of poses.")
+    return found
+
+
+def _layer(name: str, space: PoseSpace, vertices: NDArray[np.int32]) -> PoseLayer:
+    shape = (len(space.samples), len(vertices))
+    return PoseLayer(
+        name=name, space=space, vertices=freeze(vertices), moved=freeze(np.zeros(shape, np.bool_)),
+        after=freeze(np.zeros(shape[1], np.bool_)), deltas=freeze(np.zeros((*shape, 3), np.float32)),
+        targets=freeze(np.zeros((*shape, 3), np.float32)))
+
+
+def _with_all_vertices(layer: PoseLayer, count: int) -> PoseLayer:
+    empty = _layer(layer.name, layer.space, np.arange(count, dtype=np.int32))
+    moved, deltas, targets = empty.moved.copy(), empty.deltas.copy(), empty.targets.copy()
+    moved[:, layer.vertices], deltas[:, layer.vertices] = layer.moved, layer.deltas
+    targets[:, layer.vertices] = layer.targets
+    whole: PoseLayer = empty.replace(
+        kind=layer.kind, enabled=layer.enabled, moved=freeze(moved), deltas=freeze(deltas), targets=freeze(targets))
+    return whole
+
+
+def _resampled(layer: PoseLayer, samples: tuple[PoseSample, ...], sources: Sequence[int | None]) -> PoseLayer:
+    """The layer with other samples, each from the row `sources` says, or of nothing; unmoved vertices are dropped."""
+    def rows(array: NDArray[Any]) -> NDArray[Any]:
+        out = np.zeros((len(sources), *array.shape[1:]), array.dtype)
+        for to, source in enumerate(sources):
+            if source is not None:
+                out[to] = array[source]
+        return out
+
+    moved = rows(layer.moved)
+    used = np.ones(moved.shape[1], np.bool_) if None in sources else moved.any(axis=0)
+    changed: PoseLayer = layer.replace(
+        space=layer.space.replace(samples=samples), vertices=freeze(layer.vertices[used]), moved=freeze(moved[:, used]),
+        after=freeze(layer.after[used]), deltas=freeze(rows(layer.deltas)[:, used]),
+        targets=freeze(rows(layer.targets)[:, used]))
+    return changed
+
+
+def _free_name(layers: Sequence[PoseLayer], controls: Sequence[str]) -> str:
+    base = "+".join(controls)[:200]
+    taken = {layer.name for layer in layers}
+    return next(name for name in (base, *(f"{base} {i}" for i in range(2, len(taken) + 3))) if name not in taken)

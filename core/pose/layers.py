@@ -1,0 +1,245 @@
+"""Layers of sculpts: which space a sculpt belongs to, and its corrections as deltas from the layers below.
+
+A space is made of the controls that its poses move. Spaces of fewer controls lie below, and the poses sculpted there
+are anchors above, where a layer is silent: so every sculpt is met exactly, whatever was sculpted after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.pose.controls import dofs_of, rests
+from core.pose.embedding import embed, scales
+from core.pose.extraction import MOST_CONDITION, after_skinning, before_skinning, skin_affine, surface_rotations
+from core.pose.pose import REST, Pose, local_of_pose, moved_controls
+from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
+from core.pose.refusal import Refusal
+from core.pose.rig import Rig
+from core.pose.skinning import skin_matrices_of
+from core.pose.solve import TOO_CLOSE, solve, weights_at
+from core.pose.synthesis import Prepared, corrected, felt, prepare_layer, run_keys, skin_shares
+from core.record import freeze
+from core.transform import Array
+
+UNMOVED = 2e-7  # of the mesh's diagonal: what a sculpt may differ by without being a sculpt
+
+
+class Sculpt(NamedTuple):
+    """A pose and the surface sculpted there: (V, 3) object space, or None for what the layers below give."""
+
+    pose: Pose
+    target: NDArray[np.floating[Any]] | None
+    falloffs: Mapping[str, Falloff] = {}
+
+
+class LayerReport(NamedTuple):
+    """How a layer could be extracted.
+
+    condition : (M, n) float32 of the skin at each vertex of the layer at each pose; 0 where it was not sculpted.
+    flagged : (n,) the vertices that are corrected after skinning, for one of these is too large.
+    """
+
+    layer: str
+    poses: tuple[str, ...]
+    vertices: NDArray[np.int32]
+    condition: NDArray[np.float32]
+    flagged: NDArray[np.bool_]
+
+
+class Extracted(NamedTuple):
+    """Correctives and one report for each layer made anew."""
+
+    correctives: Correctives
+    reports: tuple[LayerReport, ...]
+
+
+def build(
+    points: NDArray[np.float32], rig: Rig, sculpts: Sequence[Sculpt], dofs: Sequence[Dof] | None = None,
+    **options: Any,
+) -> Extracted:
+    """Layers of all sculpts at once; in whatever order they come, the result is the same.
+
+    Parameters
+    ----------
+    points : (V, 3) float32, at rest.
+    dofs : what is read of the controls, as picked; the usual of those that are not among them.
+    options : fields of :class:`PoseSpace`, for all spaces.
+
+    Raises
+    ------
+    Refusal
+        Naming the poses that cannot be told apart.
+    UserError
+        When a pose names a control the rig does not have.
+    """
+    groups: dict[tuple[str, ...], list[Sculpt]] = {}
+    at_rest = rests(rig)
+    for sculpt in sculpts:
+        groups.setdefault(moved_controls(sculpt.pose, at_rest), []).append(sculpt)
+    if () in groups:
+        raise Refusal("duplicate", (REST_NAME, *(s.pose.name for s in groups[()])))
+    layers: list[PoseLayer] = []
+    reports: list[LayerReport] = []
+    ready: list[Prepared] = []
+    vertices = np.arange(len(points), dtype=np.int32)
+    for controls in sorted(groups, key=lambda names: (len(names), names)):
+        group = groups[controls]
+        space = PoseSpace(
+            dofs=space_dofs(rig, [s.pose for s in group], controls, dofs),
+            samples=tuple(PoseSample(pose=s.pose, falloffs=dict(s.falloffs)) for s in group), **options)
+        space = space.replace(anchors=anchors_of(space, [s.pose for layer in layers for s in layer.space.samples]))
+        targets = np.full((len(group), len(points), 3), np.nan)
+        for k, sculpt in enumerate(group):
+            if sculpt.target is not None:
+                targets[k] = sculpt.target
+        name = "+".join(controls)
+        name = name if len(name) < 200 else f"{len(controls)} controls {len(layers) + 1}"
+        layer, report = extract_layer(points, rig, ready, name, space, vertices, targets)
+        layers.append(layer)
+        reports.append(report)
+        ready.append(prepare_layer(layer, rig))
+    return Extracted(Correctives(layers=tuple(layers)), tuple(reports))
+
+
+def space_dofs(
+    rig: Rig, poses: Sequence[Pose], controls: Sequence[str], picked: Sequence[Dof] | None = None
+) -> tuple[Dof, ...]:
+    """The degrees of freedom of a space over `controls`: as picked, else the usual ones."""
+    mine = [dof for dof in picked or () if dof.control in controls]
+    have = {dof.control for dof in mine}
+    return (*mine, *(dof for dof in dofs_of(rig, poses) if dof.control in controls and dof.control not in have))
+
+
+def anchors_of(space: PoseSpace, below: Sequence[Pose]) -> tuple[Pose, ...]:
+    """The poses of layers below that this space must be told to be silent at.
+
+    Not those that are rest to it, nor those it has a sample at: there it speaks, and `cross_talk` tells.
+    """
+    size = scales(space.dofs)
+    taken = list(embed(space.dofs, [REST, *(s.pose for s in space.samples)]) * size)
+    out = []
+    for pose in below:
+        place = embed(space.dofs, [pose])[0] * size
+        if min(float(np.linalg.norm(place - other)) for other in taken) > TOO_CLOSE:
+            taken.append(place)
+            out.append(pose)
+    return tuple(out)
+
+
+def extract_layer(
+    points: NDArray[np.float32], rig: Rig, below: Sequence[Prepared], name: str, space: PoseSpace,
+    vertices: NDArray[np.int32], targets: NDArray[Any], moved: NDArray[np.bool_] | None = None,
+    like: PoseLayer | None = None,
+) -> tuple[PoseLayer, LayerReport]:
+    """The corrections of a space as deltas from the layers below.
+
+    Parameters
+    ----------
+    vertices, targets : (n,) and (M, n, 3), the sculpted surfaces; NaN where a sculpt says nothing.
+    moved : (M, n) what counts as sculpted in any case, or None.
+    like : the layer whose kind and switch to keep.
+
+    Raises
+    ------
+    Refusal
+        Naming the poses that cannot be told apart.
+    """
+    solve(space)
+    least = UNMOVED * float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    poses, count = [s.pose for s in space.samples], len(space.samples)
+    states = [_state(points, rig, below, pose, vertices) for pose in poses]
+    given = np.isfinite(targets).all(axis=2)
+    missing = np.where(given[..., None], targets - np.array([s.posed for s in states]).reshape(targets.shape), 0.0)
+    sampled = np.linalg.norm(missing, axis=2) > least
+    if moved is not None:
+        sampled |= moved & given
+    rows = np.flatnonzero(sampled.any(axis=0))
+    vertices, missing, sampled = vertices[rows], missing[:, rows], sampled[:, rows]
+    surfaces = np.array([s.posed[rows] for s in states]).reshape(missing.shape) + missing
+    before, condition = np.zeros_like(missing), np.zeros(sampled.shape)
+    for k, state in enumerate(states):
+        mine = sampled[k]
+        affine = skin_affine(rig, state.matrices, vertices[mine])
+        before[k, mine], condition[k, mine] = before_skinning(affine, missing[k, mine])
+    flagged: NDArray[np.bool_] = np.any(condition > MOST_CONDITION, axis=0)
+    deltas = before.astype(np.float32)
+    for k, state in enumerate(states):
+        mine = sampled[k] & flagged
+        affine = skin_affine(rig, state.matrices, vertices[mine])
+        deltas[k, mine] = after_skinning(affine, state.matrices, missing[k, mine])
+    shares = skin_shares(space.dofs, space.weighted, rig, vertices)
+    known = sampled.copy()
+    if like is None or like.kind == "pose-space":
+        _hold(space, known, deltas, shares, least)
+    keys = run_keys(flagged, known, shares)
+    order = np.lexsort(keys[::-1]) if len(rows) else np.zeros(0, np.int64)
+    layer = PoseLayer(
+        name=name, space=space, kind="pose-space" if like is None else like.kind,
+        enabled=like is None or like.enabled,
+        vertices=freeze(vertices[order].astype(np.int32)), moved=freeze(known[:, order]),
+        after=freeze(flagged[order]), deltas=freeze(deltas[:, order].reshape(count, -1, 3)),
+        targets=freeze(surfaces[:, order].astype(np.float32).reshape(count, -1, 3)))
+    report = LayerReport(
+        name, tuple(p.name for p in poses), layer.vertices, condition[:, order].astype(np.float32), layer.after)
+    return layer, report
+
+
+class _State(NamedTuple):
+    matrices: Array
+    posed: Array  # (n, 3) float64, object space, with all layers below
+
+
+def _state(
+    points: NDArray[np.float32], rig: Rig, below: Sequence[Prepared], pose: Pose, vertices: NDArray[np.int32]
+) -> _State:
+    local = local_of_pose(rig.skeleton, pose)
+    matrices = skin_matrices_of(rig.skeleton, local)
+    morphed, late = corrected(points, rig, tuple(below), felt(pose, rig, points, local))
+    affine = skin_affine(rig, matrices, vertices)
+    posed = np.einsum("nij,nj->ni", affine.turn, morphed[vertices].astype(np.float64)) + affine.move
+    if late:
+        moves = np.zeros((len(points), 3))
+        for places, frame_moves in late:
+            turn = surface_rotations(skin_affine(rig, matrices, places), matrices)
+            moves[places] += np.einsum("nij,nj->ni", turn, frame_moves.astype(np.float64))
+        posed += moves[vertices]
+    return _State(matrices, posed)
+
+
+def _hold(
+    space: PoseSpace, known: NDArray[np.bool_], deltas: NDArray[np.float32], shares: Array, least: float
+) -> None:
+    """Add to the samples of each vertex, in place, those poses where it would be moved though nobody sculpted it.
+
+    Vertices that know the same poses are asked together. Of sets that cannot be solved by themselves (three of four
+    poses may lie in a plane) all poses are taken.
+    """
+    places = embed(space.dofs, [s.pose for s in space.samples])
+    while True:
+        changed = False
+        keys = run_keys(np.zeros(known.shape[1], np.bool_), known, shares)
+        _, which = np.unique(keys, axis=1, return_inverse=True) if known.shape[1] else (None, np.zeros(0, np.int64))
+        for group in range(int(which.max(initial=-1)) + 1):
+            rows = np.flatnonzero(which == group)
+            mine = known[:, rows[0]].copy()
+            if mine.all():
+                continue
+            try:
+                solved = solve(space, mine, shares[rows[0]] if shares.size else None)
+            except Refusal:
+                known[:, rows] = True
+                changed = True
+                continue
+            others = np.flatnonzero(~mine)
+            share = weights_at(solved, places[others])[:, solved.silent :]
+            moves = np.einsum("om,mnd->ond", share, deltas[mine][:, rows].astype(np.float64))
+            found = np.linalg.norm(moves, axis=2) > least
+            if found.any():
+                known[others[:, None], rows[None]] |= found
+                changed = True
+        if not changed:
+            return
