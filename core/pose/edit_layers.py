@@ -20,8 +20,15 @@ from core.record import freeze
 from core.transform import Array
 
 
-def refresh(points: NDArray[np.float32], rig: Rig, correctives: Correctives, first: int = 0) -> Extracted:
+def refresh(
+    points: NDArray[np.float32], rig: Rig, correctives: Correctives, first: int = 0, kept: Correctives | None = None
+) -> Extracted:
     """Extract layers `first` and on again from their target surfaces, in order, each upon those below.
+
+    Parameters
+    ----------
+    kept : what they were before an edit below: then at each of their poses the whole surface stays as it was, also
+        where the layer had nothing to say. Otherwise such vertices follow the layers below.
 
     Raises
     ------
@@ -31,11 +38,18 @@ def refresh(points: NDArray[np.float32], rig: Rig, correctives: Correctives, fir
     ready: list[Prepared] = []
     layers: list[PoseLayer] = []
     reports: list[LayerReport] = []
+    before = prepare(kept, rig)
     for i, layer in enumerate(correctives.layers):
+        if i >= first and kept is not None:
+            layer = _with_all_vertices(layer, len(points))
         if i >= first:
             below = [s.pose for lower in layers for s in lower.space.samples]
             space = layer.space.replace(anchors=anchors_of(layer.space, below))
             targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
+            if kept is not None:
+                poses = [s.pose for s in space.samples]
+                whole = np.array([evaluate(points, rig, kept, pose, prepared=before) for pose in poses])
+                targets = np.where(layer.moved[..., None], layer.targets, whole)
             layer, report = extract_layer(
                 points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer)
             reports.append(report)
@@ -52,7 +66,8 @@ def add_sculpt(
     """Correctives with one more sculpt (or a sculpt anew, when its pose has the name of one).
 
     It joins the space that moves the same controls; else a new space begins, below those that move more controls
-    beside these. Only vertices it moves become its own. Later layers are extracted again.
+    beside these. Only vertices it moves become its own. Later layers are extracted again, their sculpts
+    held.
 
     Parameters
     ----------
@@ -62,8 +77,8 @@ def add_sculpt(
     controls = moved_controls(pose, rests(rig))
     if not controls:
         raise Refusal("duplicate", (REST_NAME, pose.name))
-    old = find_pose(correctives, pose.name)
-    if old is not None:
+    kept = correctives
+    if find_pose(correctives, pose.name) is not None:
         correctives = without_pose(correctives, pose.name)
     sample = PoseSample(pose=pose, falloffs=dict(falloffs or {}))
     layers = list(correctives.layers)
@@ -85,7 +100,7 @@ def add_sculpt(
     space = layer.space.replace(anchors=anchors_of(layer.space, below))
     layers[at], report = extract_layer(
         points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer)
-    rest = refresh(points, rig, Correctives(layers=tuple(layers)), at + 1)
+    rest = refresh(points, rig, Correctives(layers=tuple(layers)), at + 1, kept)
     return Extracted(rest.correctives, (report, *rest.reports))
 
 
