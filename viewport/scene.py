@@ -85,8 +85,8 @@ class GuideLines(NamedTuple):
     """Guides as lines of constant width in pixels.
 
     points : (G, P, 3) or (G, 3, P) float32. states : (G,) uint8, indices into `colors`: plain, selected, frozen,
-    sprayed, trouble. normals : (G, 3) float32 of the skin at the roots, or None when all guides are drawn from all
-    sides.
+    sprayed, trouble. opacity : of plain guides, those nothing is said about. normals : (G, 3) float32 of the skin at
+    the roots, or None when all guides are drawn from all sides.
     """
 
     points: np.ndarray
@@ -95,6 +95,7 @@ class GuideLines(NamedTuple):
         (0.74, 0.39, 0.10), (1.0, 0.86, 0.55), (0.25, 0.45, 0.75), (0.20, 0.60, 0.42), (0.85, 0.09, 0.07)
     )
     pixels: float = 1.5
+    opacity: float = 0.85
     normals: np.ndarray | None = None
 
 

@@ -55,6 +55,7 @@ from viewport.shaders import program, set_uniforms
 SLICE_MS = 14.0  # work is added to a slice until it has taken so long; the last piece may take as long again
 FULL_PART = 0.4  # of the refinement is done when all hairs are shown
 FINISHED_SAMPLES = 2
+COATED_PIXELS, COATED_OPACITY = 1.0, 0.24  # of plain guides over a coat
 TEXT_PIXELS = 12.0
 HUD_MARGIN = 14.0
 
@@ -114,9 +115,12 @@ class View3D:
         if same(self._given, given):
             return False
         self._given = given
-        self.scene = scene._replace(
-            coats=scene.coats if options.hair else (), guides=scene.guides if options.guides else ()
-        )
+        coats, guides = scene.coats if options.hair else (), scene.guides if options.guides else ()
+        if coats:  # hair is seen first
+            guides = tuple(
+                lines._replace(pixels=min(lines.pixels, COATED_PIXELS), opacity=COATED_OPACITY) for lines in guides
+            )
+        self.scene = scene._replace(coats=coats, guides=guides)
         self.camera, self.size, self.options = camera, size, options
         self.renderer.backdrop.set_plate(self.pictures.pixels(options.background))
         self.pictures.keep({options.background, *(reference.path for reference in options.references)})

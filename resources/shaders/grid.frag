@@ -22,12 +22,12 @@ void main()
     vec2 step_pixel = pixel / grid_step;
     vec2 p = (at + grid_phase) / grid_step;
     vec2 few = lines(0.1 * p, 0.1 * step_pixel), many = lines(p, step_pixel);
-    float strength = max(0.30 * small_part * max(many.x, many.y), 0.55 * max(few.x, few.y));
-    vec2 axis = clamp((1.3 - abs(at - grid_origin) / pixel) * width, 0.0, 1.0);
+    float strength = max(0.045 * small_part * max(many.x, many.y), 0.10 * max(few.x, few.y));
+    vec2 axis = clamp((1.0 - abs(at - grid_origin) / pixel) * width, 0.0, 1.0);
     vec3 color = grid_color;
     if (max(axis.x, axis.y) > 0.0) {
         color = axis.y > axis.x ? axis_colors[0] : axis_colors[1];
-        strength = max(strength, 0.8 * max(axis.x, axis.y));
+        strength = max(strength, 0.24 * max(axis.x, axis.y));
     }
     out_color = vec4(color, 1.0) * (strength * min(fade, 1.0));
 }

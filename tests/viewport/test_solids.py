@@ -119,18 +119,18 @@ def test_the_grid_has_lines_on_the_ground_and_hides_behind_things(picture):
     on_axes = [(-0.9, 0.0, 0.0), (1.3, 0.0, 0.0), (0.0, 0.0, -1.3), (0.0, 0.0, 1.1)]
     for point in on_axes:
         y, x = pixel(cam, point)
-        assert gained[y - 1 : y + 2, x - 1 : x + 2].max() > 30
+        assert gained[y - 1 : y + 2, x - 1 : x + 2].max() > 10
     small = quad(z=0.0, half=1e-3)  # so that the ground lies in the same place
     free = np.abs(picture(Scene((small,)), cam, BARE.replace(grid=True), 2) - picture(Scene((small,)), cam, samples=2))
     corners = np.array([[-0.28, -0.28, 0.0], [0.28, -0.28, 0.0], [0.28, 0.28, 0.0], [-0.28, 0.28, 0.0]])
     inside = np.zeros((H, W), np.uint8)
     cv2.fillConvexPoly(inside, np.rint(project(cam, corners, W, H).xy).astype(np.int32), 1)
     upper = inside.astype(bool) & (np.arange(H)[:, None] < pixel(cam, (0.0, 0.05, 0.0))[0])
-    assert free.max(axis=2)[upper].max() > 10, "there are lines behind it"
+    assert free.max(axis=2)[upper].max() > 3, "there are lines behind it"
     assert gained[upper].max() <= 1
     red, blue = grid[pixel(cam, on_axes[0])], grid[pixel(cam, on_axes[2])]
-    assert red[0] > red[2] + 15
-    assert blue[2] > blue[0] + 15
+    assert red[0] > red[2] + 8
+    assert blue[2] > blue[0] + 8
     horizon = pixel(cam, (-3000.0, 0.0, -4000.0))[0]
     assert gained[: max(horizon, 1)].max() <= 1
 
@@ -142,7 +142,7 @@ def test_the_grid_adapts_its_step_and_faces_orthographic_views(picture):
         skin = quad()
         scene = Scene((skin._replace(points=skin.points * np.float32(1e-4 * distance)),))
         bare, grid = picture(scene, cam), picture(scene, cam, BARE.replace(grid=True))
-        lines = np.abs(grid - bare).max(axis=2) > 6
+        lines = np.abs(grid - bare).max(axis=2) > 2
         assert 0.03 < lines[H // 2 :].mean() < 0.7, "neither none nor a carpet"
     for eye, axes in (((0, 0, 5), "xy"), ((5, 0, 0), "zy"), ((3, 4, 5), "xz")):
         found = ground_axes(camera(eye, orthographic=True))

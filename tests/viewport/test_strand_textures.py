@@ -7,7 +7,6 @@ import pytest
 
 from core.camera import project
 from tests.viewport.scenes import camera, hairs
-from viewport.drawables.guides import PLAIN_OPACITY
 from viewport.renderer import Renderer
 from viewport.scene import Coat, GuideLines, Scene
 from viewport.strand_textures import StrandTextures
@@ -81,7 +80,7 @@ def test_guides_wear_the_colour_of_their_state(draw):
         x, y = project(camera(), points[i, :, 8].astype(float), W, H).xy
         pixel = image[round(y), round(x)]
         np.testing.assert_allclose(pixel[:3] / pixel[3], lines.colors[lines.states[i]], atol=0.01)
-        assert pixel[3] == pytest.approx(PLAIN_OPACITY if i == 0 else 1.0, abs=0.02)
+        assert pixel[3] == pytest.approx(lines.opacity if i == 0 else 1.0, abs=0.02)
 
 
 def test_strands_of_an_impossible_shape_are_refused(ctx):

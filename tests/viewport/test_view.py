@@ -15,7 +15,7 @@ from tests.viewport.scenes import FLAT, ball, camera, hairs, quad
 from viewport.context import collect
 from viewport.renderer import Renderer
 from viewport.scene import Coat, GuideLines, Look, Scene
-from viewport.view import FINISHED_SAMPLES, View3D
+from viewport.view import COATED_OPACITY, COATED_PIXELS, FINISHED_SAMPLES, View3D
 
 W, H = 200, 150
 BARE = ViewOptions(grid=False, axes=False, hud=False)
@@ -138,7 +138,8 @@ def test_the_refined_picture_is_that_of_the_renderer_to_the_bit(ctx, view, prese
     assert not view.picture_changed
     renderer = Renderer(ctx, shadow_side=256)
     target = ctx.framebuffer([ctx.renderbuffer((W, H), 4)])
-    renderer.draw(scene, camera(), target, (W, H), FINISHED_SAMPLES)
+    discreet = guides._replace(pixels=COATED_PIXELS, opacity=COATED_OPACITY)  # over a coat
+    renderer.draw(scene._replace(guides=(discreet,)), camera(), target, (W, H), FINISHED_SAMPLES)
     expected = np.frombuffer(target.read(alignment=1), np.uint8).reshape(H, W, 3)[::-1]
     assert np.array_equal(fine, expected)
     renderer.release()

@@ -13,8 +13,6 @@ from viewport.scene import GuideLines
 from viewport.shaders import program, set_uniforms
 from viewport.strand_textures import StrandTextures
 
-PLAIN_OPACITY = 0.55  # of guides nothing is said about: the coat stays in sight
-
 
 class GuidePrograms:
     """The program all guides are drawn with."""
@@ -32,8 +30,13 @@ def guide_colors(lines: GuideLines) -> NDArray[np.float32]:
     out = np.ones((len(lines.states), 4), np.float32)
     palette = np.asarray(lines.colors, np.float32)
     out[:, :3] = palette[np.minimum(lines.states, len(palette) - 1)]
-    out[lines.states == 0, 3] = PLAIN_OPACITY
+    out[lines.states == 0, 3] = lines.opacity
     return out
+
+
+def _dressed(lines: GuideLines) -> tuple[Any, ...]:
+    """What the tints of guides are made from, beside their states."""
+    return lines.colors, lines.opacity
 
 
 class GuideDrawable:
@@ -50,13 +53,13 @@ class GuideDrawable:
     def holds(self, lines: GuideLines) -> bool:
         """True when the textures hold just these arrays and colours."""
         mine = self.lines
-        return mine.points is lines.points and mine.states is lines.states and mine.colors == lines.colors
+        return mine.points is lines.points and mine.states is lines.states and _dressed(mine) == _dressed(lines)
 
     def update(self, lines: GuideLines) -> bool:
         """Take over other guides, whose arrays that differ are uploaded next; False when the size is another."""
         if lines.points is not self.lines.points and not self.textures.resize(lines.points):
             return False
-        self.tints_stale |= lines.states is not self.lines.states or lines.colors != self.lines.colors
+        self.tints_stale |= lines.states is not self.lines.states or _dressed(lines) != _dressed(self.lines)
         self.lines = lines
         return True
 
