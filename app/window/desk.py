@@ -97,9 +97,11 @@ class Desk(QObject):
 
     def end_stroke(self, cancel: bool = False) -> None:
         """Release (or give up) the stroke that goes on, and let panels look again."""
-        hand = self.session.hand
+        hand, old = self.session.hand, self.session.workspace
         if hand.stroking:
             self.attempt(hand.cancel if cancel else hand.release)
+            if self.session.workspace is not old:  # a stroke may pick something, as the clone tool its source
+                self.workspace_changed.emit(old, self.session.workspace)
             self.stroke_ended.emit()
 
     def _listen(self, session: Session) -> None:
