@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from core.camera import frame_points
-from core.document import Document, find_mesh
+from core.document import Document, find_mesh, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats import curve_file
@@ -17,6 +17,7 @@ from core.formats.project import write_project
 from core.groom.children import Children
 from core.groom.export import groom_strands
 from core.groom.flow import nose_vertex
+from core.groom.groom import Groom
 from core.groom.strands import GroomStrands
 from core.mesh.skin import Skin, skin_at_rest, skin_posed
 from core.pose.skinning import posed_points
@@ -47,15 +48,23 @@ def check_outputs(outputs: list[Path], png: Path | None) -> None:
 
 
 def deliver(path: Path, document: Document, children: Mapping[int, Children]) -> None:
-    """Write the document (``.filo``) or its first coat (USD, Alembic, .hair) to `path`."""
+    """Write the document (``.filo``) or its first visible coat (USD, Alembic, .hair) to `path`."""
     if path.suffix.lower() == ".filo":
         write_project(path, document)
         return
     if not document.grooms:
         raise UserError(f"there is no groom to write to {path.name}; a mesh alone goes to .obj, .ply or .glb")
-    groom = document.grooms[0]
+    groom = exported_groom(document)
     mesh = find_mesh(document, groom.mesh_id).mesh
     curve_file.write_groom(path, groom_strands(groom, mesh, children[groom.id]), mesh)
+
+
+def exported_groom(document: Document) -> Groom:
+    """The first groom that is not hidden; UserError when all are."""
+    shown = visible_grooms(document)
+    if not shown:
+        raise UserError("Every groom of this document is hidden; show the one to export in the scene panel.")
+    return shown[0]
 
 
 def posed_document(document: Document, frame: float | None, evaluator: Evaluator) -> dict[int, Skin]:

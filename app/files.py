@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from app.deliver import deliver, draw, draw_strands, posed_document
-from core.document import Document, MeshObject
+from app.deliver import deliver, draw, draw_strands, exported_groom, posed_document
+from core.document import Document, MeshObject, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats import curve_file, mesh_file, project, recovery
@@ -93,7 +93,8 @@ def draw_file(
     skins = posed_document(document, frame, evaluator)
     now = document.first_frame if frame is None else frame
     children = {
-        g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id], frame=now) for g in document.grooms
+        g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id], frame=now)
+        for g in visible_grooms(document)
     }
     draw(png, document, children, evaluator, size, view, skins=skins)
 
@@ -111,7 +112,7 @@ def _convert_document(document: Document, target: Path) -> dict[str, Any]:
     meshes = {item.id: item.mesh for item in document.meshes}
     children = {}
     if suffix not in PROJECT:
-        first = document.grooms[0]
+        first = exported_groom(document)
         children = {first.id: grow(first, meshes[first.mesh_id], evaluator, frame=document.first_frame)}
     deliver(target, document, children)
     if children:

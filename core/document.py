@@ -104,6 +104,23 @@ def find_groom(document: Document, groom_id: int) -> Groom:
     raise UserError(f"There is no groom {groom_id} in this document; choose one of {[g.id for g in document.grooms]}.")
 
 
+def mesh_to_edit(document: Document, groom: Groom) -> MeshObject:
+    """The mesh of a groom that tools may work on; UserError when a lock or an eye keeps them off."""
+    item = find_mesh(document, groom.mesh_id)
+    if item.locked:
+        raise UserError(f"{item.name} is locked; unlock it in the scene panel to edit its hair.")
+    if groom.locked:
+        raise UserError(f"{groom.name} is locked; unlock it in the scene panel to edit its hair.")
+    if groom.hidden:
+        raise UserError(f"{groom.name} is hidden; show it in the scene panel to edit its hair.")
+    return item
+
+
+def visible_grooms(document: Document) -> tuple[Groom, ...]:
+    """The grooms that are not hidden: those in views, pictures and exports. (Their meshes may be hidden.)"""
+    return tuple(groom for groom in document.grooms if not groom.hidden)
+
+
 def with_mesh(document: Document, item: MeshObject) -> Document:
     """The document with `item` in place of the mesh of the same id, or added at the end."""
     return document.replace(meshes=_put(document.meshes, item))

@@ -198,6 +198,18 @@ def move_groom(document: Document, groom_id: int, place: int) -> Document:
     return document.replace(grooms=_moved(document.grooms, item, place))
 
 
+def set_groom_hidden(document: Document, groom_id: int, hidden: bool) -> Document:
+    """The document with a groom hidden (from views, pictures and exports) or shown."""
+    item = find_groom(document, groom_id)
+    return document if item.hidden == hidden else with_groom(document, item.replace(hidden=hidden))
+
+
+def set_groom_locked(document: Document, groom_id: int, locked: bool) -> Document:
+    """The document with a groom locked against every tool and action, or free."""
+    item = find_groom(document, groom_id)
+    return document if item.locked == locked else with_groom(document, item.replace(locked=locked))
+
+
 def set_coat(document: Document, groom_id: int, **changes: Any) -> Document:
     """The document with fields of a groom's coat changed.
 

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from core.camera import clip_from_world
-from core.document import Document, find_mesh, with_groom
+from core.document import Document, mesh_to_edit, with_groom
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.groom.guides import Guides
@@ -76,7 +76,7 @@ class Hand:
         Raises
         ------
         UserError
-            It cannot begin (no groom, a locked mesh, nothing to edit): the message says what to do.
+            It cannot begin (no groom, a lock, nothing to edit): the message says what to do.
         """
         self.cancel()
         tool = self.tool_for(pointer) if tool is None else tool
@@ -209,9 +209,7 @@ class Hand:
         session, workspace = self.session, self.session.workspace
         document = session.history.current
         groom = session.groom
-        item = find_mesh(document, groom.mesh_id)
-        if item.locked:
-            raise UserError(f"{item.name} is locked; unlock it in the scene panel to edit its hair.")
+        item = mesh_to_edit(document, groom)
         key = (
             groom, item, workspace.frame, workspace.respect, sight.camera, sight.width, sight.height, document.unit,
             tool.at_rest, tool.edits,

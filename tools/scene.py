@@ -17,9 +17,17 @@ def active_mesh(document: Document, workspace: Workspace) -> MeshObject | None:
 
 def show_all(document: Document) -> Document:
     """The document with nothing hidden."""
-    if not any(item.hidden for item in document.meshes):
+    if not anything_hidden(document):
         return document
-    return document.replace(meshes=tuple(m.replace(hidden=False) if m.hidden else m for m in document.meshes))
+    return document.replace(
+        meshes=tuple(m.replace(hidden=False) if m.hidden else m for m in document.meshes),
+        grooms=tuple(g.replace(hidden=False) if g.hidden else g for g in document.grooms),
+    )
+
+
+def anything_hidden(document: Document) -> bool:
+    """True when a mesh or a groom is hidden."""
+    return any(m.hidden for m in document.meshes) or any(g.hidden for g in document.grooms)
 
 
 def isolated(document: Document, workspace: Workspace) -> Workspace:

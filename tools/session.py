@@ -202,7 +202,7 @@ class Session:
         Raises
         ------
         UserError
-            There is no such action or no groom, its mesh is locked, or there is nothing to do it to.
+            There is no such action or no groom, it is locked or hidden, or there is nothing to do it to.
         """
         if name not in ACTIONS:
             raise UserError(f"There is no action named {name!r}; choose one of {', '.join(ACTIONS)}.")

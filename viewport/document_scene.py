@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from core.document import Document
+from core.document import Document, visible_grooms
 from core.groom.children import Children, Traits
 from core.groom.groom import Coat as CoatRecord
 from core.groom.strands import GroomStrands, Strands
@@ -18,8 +18,9 @@ DRAWN_POINTS = 16
 
 
 def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[int, Children]) -> Scene:
-    """The scene of every visible mesh (in the pose of its skin) and every coat in `children` (by groom id)."""
-    coats = {g.mesh_id: look_of(g.coat, children[g.id].traits) for g in document.grooms if g.id in children}
+    """The scene of every visible mesh (in the pose of its skin) and every visible coat in `children` (by groom id)."""
+    grooms = [groom for groom in visible_grooms(document) if groom.id in children]
+    coats = {g.mesh_id: look_of(g.coat, children[g.id].traits) for g in grooms}
     surfaces = tuple(
         Surface(
             skins[item.id].points, skins[item.id].normals, skins[item.id].triangles.vertices,
@@ -30,8 +31,8 @@ def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[in
     )
     hair = tuple(
         coat_of(g.coat, children[g.id])
-        for g in document.grooms
-        if g.id in children and len(children[g.id])
+        for g in grooms
+        if len(children[g.id])
     )
     return Scene(surfaces, hair)
 

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from core.document import Document, MeshObject
+from core.document import Document, MeshObject, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.groom.binding import CoatBinding
@@ -262,7 +262,7 @@ class LiveScene:
         meshes = {item.id: item for item in self._visible_meshes()}
         return [
             (meshes[groom.mesh_id], groom, self._frames.posed(meshes[groom.mesh_id], self._frame))
-            for groom in self._document.grooms if groom.mesh_id in meshes
+            for groom in visible_grooms(self._document) if groom.mesh_id in meshes
         ]
 
     def _skin(self, item: MeshObject, posed: Posed) -> Collision | None:

@@ -33,6 +33,8 @@ from tools.document_edits import (
     dressed,
     remove_groom,
     remove_mesh,
+    set_groom_hidden,
+    set_groom_locked,
     set_mesh_hidden,
     set_mesh_locked,
 )
@@ -42,7 +44,7 @@ Index = QModelIndex | QPersistentModelIndex
 
 
 class Rows(QStyledItemDelegate):
-    """Draws a row: icon, name, count; eye and lock of a mesh at the right, when they say something or are near."""
+    """Draws a row: icon, name, count; eye and lock at the right, when they say something or are near."""
 
     def __init__(self, tree: Outliner) -> None:
         super().__init__(tree)
@@ -58,12 +60,12 @@ class Rows(QStyledItemDelegate):
             painter.fillRect(option.rect, look.theme.colour("accent_ground" if chosen else "hover"))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         mesh = self._tree.mesh_of(item)
-        colour = "accent" if chosen else "dim" if mesh.hidden else "text"
+        colour = "accent" if chosen else "dim" if mesh.hidden or item.hidden else "text"
         side = float(look.icon - 4)
         paint_icon(painter, "mesh" if isinstance(item, MeshObject) else "groom",
                    QRectF(area.left() + 2, area.center().y() - side / 2, side, side),
                    look.theme.colour("accent" if chosen else "dim"))
-        inside = area.adjusted(side + 8, 0, -2.0 * look.icon if isinstance(item, MeshObject) else -4.0, 0)
+        inside = area.adjusted(side + 8, 0, -2.0 * look.icon, 0)
         painter.setFont(text_font(look))
         metrics = QFontMetricsF(painter.font())
         words = counted(item)
@@ -76,14 +78,13 @@ class Rows(QStyledItemDelegate):
         if rest.width() > 0:
             painter.drawText(rest, Qt.AlignmentFlag.AlignVCenter,
                              metrics.elidedText(words, Qt.TextElideMode.ElideRight, rest.width()))
-        if isinstance(item, MeshObject):
-            eye, lock = self.buttons(option.rect)
-            if over or item.hidden:
-                paint_icon(painter, "eye-off" if item.hidden else "eye", eye,
-                           look.theme.colour("text" if item.hidden else "dim"))
-            if over or item.locked:
-                paint_icon(painter, "lock" if item.locked else "unlock", lock,
-                           look.theme.colour("text" if item.locked else "dim"))
+        eye, lock = self.buttons(option.rect)
+        if over or item.hidden:
+            paint_icon(painter, "eye-off" if item.hidden else "eye", eye,
+                       look.theme.colour("text" if item.hidden else "dim"))
+        if over or item.locked:
+            paint_icon(painter, "lock" if item.locked else "unlock", lock,
+                       look.theme.colour("text" if item.locked else "dim"))
         painter.restore()
 
     @staticmethod
@@ -210,7 +211,7 @@ class Outliner(QTreeView):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         index = self.indexAt(event.position().toPoint())
         item = self.scene.item(index)
-        if isinstance(item, MeshObject) and event.button() == Qt.MouseButton.LeftButton:
+        if item is not None and event.button() == Qt.MouseButton.LeftButton:
             eye, lock = self.rows.buttons(self.visualRect(index))
             if eye.contains(event.position()):
                 self.toggle_hidden(item)
@@ -262,13 +263,15 @@ class Outliner(QTreeView):
 
     # -- what it does ----------------------------------------------------------------------------------------
 
-    def toggle_hidden(self, item: MeshObject) -> None:
-        """Hide a mesh with its grooms, or show it."""
-        self._desk.edit("Show" if item.hidden else "Hide", set_mesh_hidden, item.id, not item.hidden)
+    def toggle_hidden(self, item: Item) -> None:
+        """Hide a mesh with its grooms or one groom, or show it."""
+        change = set_mesh_hidden if isinstance(item, MeshObject) else set_groom_hidden
+        self._desk.edit("Show" if item.hidden else "Hide", change, item.id, not item.hidden)
 
-    def toggle_locked(self, item: MeshObject) -> None:
-        """Keep tools off a mesh and its grooms, or let them."""
-        self._desk.edit("Unlock" if item.locked else "Lock", set_mesh_locked, item.id, not item.locked)
+    def toggle_locked(self, item: Item) -> None:
+        """Keep tools off a mesh and its grooms or off one groom, or let them."""
+        change = set_mesh_locked if isinstance(item, MeshObject) else set_groom_locked
+        self._desk.edit("Unlock" if item.locked else "Lock", change, item.id, not item.locked)
 
     def delete(self, item: Item | None) -> None:
         """Delete a mesh with its grooms, or a groom; undo brings it back."""
@@ -339,10 +342,13 @@ class Outliner(QTreeView):
             return menu
         mesh, view = self.mesh_of(item), self._desk.workspace.view
         add(menu, "Rename\tF2", None, "Gives it another name; a double click does too.", lambda: self.edit(index))
-        add(menu, "Show" if mesh.hidden else "Hide", "show" if mesh.hidden else "hide",
-            "Leaves the mesh and its hair out of the view, in the project too.", lambda: self.toggle_hidden(mesh))
-        add(menu, "Unlock" if mesh.locked else "Lock", "unlock" if mesh.locked else "lock",
-            "Keeps every tool off the mesh and its grooms.", lambda: self.toggle_locked(mesh))
+        whole = isinstance(item, MeshObject)
+        add(menu, "Show" if item.hidden else "Hide", "show" if item.hidden else "hide",
+            "Leaves the mesh and its hair out of the view, in the project too." if whole else
+            "Leaves the groom out of the view, of pictures and of exports.", lambda: self.toggle_hidden(item))
+        add(menu, "Unlock" if item.locked else "Lock", "unlock" if item.locked else "lock",
+            "Keeps every tool off the mesh and its grooms." if whole else "Keeps every tool off the groom.",
+            lambda: self.toggle_locked(item))
         add(menu, "Isolate", "isolate", "Shows only this mesh with its grooms; again shows everything.",
             lambda: self.toggle_isolated(mesh), view.isolated == (mesh.id,))
         add(menu, "Ghost", "ghost", "Shows the mesh translucent, so that you see what lies behind.",

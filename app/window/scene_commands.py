@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from app.window.commands import Command, Window
-from tools.document_edits import add_empty_groom, remove_groom, set_mesh_locked
+from tools.document_edits import add_empty_groom, remove_groom, set_groom_hidden, set_groom_locked, set_mesh_locked
 from tools.scene import active_mesh
 
 if TYPE_CHECKING:
@@ -44,6 +44,27 @@ def _is_locked(desk: Desk) -> bool:
     return mesh is not None and mesh.locked
 
 
+def _hide_groom(window: Window) -> None:
+    groom = window.desk.groom
+    if groom is not None:
+        window.desk.edit("Show groom" if groom.hidden else "Hide groom", set_groom_hidden, groom.id, not groom.hidden)
+
+
+def _lock_groom(window: Window) -> None:
+    groom = window.desk.groom
+    if groom is not None:
+        step = "Unlock groom" if groom.locked else "Lock groom"
+        window.desk.edit(step, set_groom_locked, groom.id, not groom.locked)
+
+
+def _is_groom_hidden(desk: Desk) -> bool:
+    return desk.groom is not None and desk.groom.hidden
+
+
+def _is_groom_locked(desk: Desk) -> bool:
+    return desk.groom is not None and desk.groom.locked
+
+
 SCENE: tuple[Command, ...] = (
     Command(
         "scene.add_groom", "Add a groom", "Adds an empty groom to the active mesh, to plant guides in it.",
@@ -57,4 +78,12 @@ SCENE: tuple[Command, ...] = (
         "scene.lock", "Lock the mesh", "Keeps every tool off the active mesh and its grooms until it is unlocked.",
         _lock, "tools.document_edits.set_mesh_locked", "document", "Lock", _needs_mesh, _is_locked, "lock",
         words="unlock protect"),
+    Command(
+        "scene.hide_groom", "Hide the groom", "Leaves the active groom out of the view and exports; again shows it.",
+        _hide_groom, "tools.document_edits.set_groom_hidden", "document", "Hide groom", _needs_groom,
+        _is_groom_hidden, "eye-off", words="show coat hair fur invisible"),
+    Command(
+        "scene.lock_groom", "Lock the groom", "Keeps every tool and action off the active groom until it is unlocked.",
+        _lock_groom, "tools.document_edits.set_groom_locked", "document", "Lock groom", _needs_groom,
+        _is_groom_locked, "lock", words="unlock coat hair fur protect"),
 )

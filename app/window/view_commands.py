@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.window.commands import Command, Window, is_on, switch
 from tools.document_edits import set_mesh_hidden
-from tools.scene import active_mesh, ghosted, isolated, show_all, stored_bookmark
+from tools.scene import active_mesh, anything_hidden, ghosted, isolated, show_all, stored_bookmark
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
@@ -38,7 +38,7 @@ def _needs_something(desk: Desk) -> str | None:
 
 
 def _needs_hidden(desk: Desk) -> str | None:
-    hidden = any(item.hidden for item in desk.session.document.meshes)
+    hidden = anything_hidden(desk.session.document)
     view = desk.session.workspace.view
     return None if hidden or view.isolated or view.ghosted else "Nothing is hidden."
 
@@ -205,7 +205,7 @@ VIEW: tuple[Command, ...] = (
         _hide, "tools.document_edits.set_mesh_hidden", "document", undo="Hide", enabled=_needs_something,
         scope="viewport", icon="hide", words="invisible"),
     Command(
-        "view.unhide_all", "Show all", "Shows every hidden, isolated or ghosted mesh the way it was.",
+        "view.unhide_all", "Show all", "Shows every hidden, isolated or ghosted mesh and groom the way it was.",
         _unhide, "tools.scene.show_all", "document", undo="Show all", enabled=_needs_hidden, scope="viewport",
         icon="show", words="unhide reveal visible"),
     Command(

@@ -124,6 +124,7 @@ class Groom(Record):
 
     id : stable, unique in the document.
     mesh_id : the mesh it grows on.
+    hidden : neither drawn nor exported, and no tool works on it.
     """
 
     id: int
@@ -132,6 +133,12 @@ class Groom(Record):
     guides: Guides
     coat: Coat = Coat()
     maps: tuple[Map, ...] = ()
+    hidden: Annotated[bool, field(
+        "Hidden", "Leaves the groom out of the view, of pictures and of exports; it stays in the project.",
+    )] = False
+    locked: Annotated[bool, field(
+        "Locked", "Keeps every tool and action off the groom until it is unlocked again.",
+    )] = False
 
     def __post_init__(self) -> None:
         text(self, "name")

@@ -9,6 +9,7 @@ from core.groom.length import lengths
 from core.record import freeze
 from core.workspace import Respect, Workspace
 from tests.tools.scenes import BENT, EVALUATOR, document, empty, guides_of, session, symmetric_fur
+from tools.document_edits import set_groom_hidden, set_groom_locked
 from tools.groom.actions import ACTIONS
 from tools.session import Session
 
@@ -143,3 +144,9 @@ def test_no_groom_no_guides_a_lock_and_wrong_words():
         session(empty()).act("mirror")
     with pytest.raises(UserError, match="ball is locked"):
         Session(document(locked=True), evaluator=EVALUATOR).act("select_all")
+    for edit, word in ((set_groom_locked, "locked"), (set_groom_hidden, "hidden")):
+        s = session()
+        s.edit("Keep off", edit, 1, True)
+        with pytest.raises(UserError, match=f"coat is {word}"):
+            s.act("select_all")
+        assert s.history.names == ("New", "Keep off")

@@ -50,6 +50,10 @@ def test_meshes_come_go_and_move(tmp_path):
     assert edits.rename_mesh(two, 2, "  a horn\n").meshes[1].name == "a horn"
     assert edits.set_mesh_hidden(two, 2, True).meshes[1].hidden
     assert edits.set_mesh_hidden(two, 2, False) is two
+    assert edits.set_groom_hidden(two, 1, True).grooms[0].hidden
+    assert edits.set_groom_hidden(two, 1, False) is two
+    assert edits.set_groom_locked(two, 1, True).grooms[0].locked
+    assert edits.set_groom_locked(two, 1, False) is two
     with pytest.raises(UserError, match="letter"):
         edits.rename_mesh(two, 2, " \t")
     with pytest.raises(UserError, match="no mesh 9"):

@@ -24,6 +24,7 @@ from tests.tools.scenes import (
     sight,
     symmetric_fur,
 )
+from tools.document_edits import set_groom_hidden, set_groom_locked
 from tools.registry import Registry
 from tools.session import Session
 from tools.tool import Tool
@@ -154,6 +155,23 @@ def test_no_groom_and_a_locked_mesh_are_said_in_words(name):
         locked.hand.press(sight(), WAY[0])
     assert locked.hand.hover(sight(), WAY[0]) == ()
     untouched(locked, before)
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(("edit", "word"), [(set_groom_locked, "locked"), (set_groom_hidden, "hidden")])
+def test_a_locked_or_hidden_groom_refuses_strokes(name, edit, word):
+    s = session()
+    s.edit("Keep off", edit, 1, True)
+    before = s.document
+    s.choose(name)
+    with pytest.raises(UserError, match=f"coat is {word}"):
+        s.hand.press(sight(), WAY[0])
+    assert s.hand.hover(sight(), WAY[0]) == ()
+    assert s.document is before
+    assert not s.stroking
+    s.edit("Let", edit, 1, False)
+    s.hand.press(sight(), WAY[0])
+    s.hand.cancel()
 
 
 @pytest.mark.parametrize("frame", [1001.0, BENT])

@@ -6,7 +6,7 @@ from core.camera import Camera, look_at
 from core.document import Document, MeshObject, with_groom, with_mesh
 from core.workspace import Workspace
 from tests.documents import grid_mesh, small_document
-from tools.document_edits import set_mesh_hidden
+from tools.document_edits import set_groom_hidden, set_mesh_hidden
 from tools.scene import active_mesh, ghosted, isolated, show_all, stored_bookmark
 
 
@@ -36,6 +36,9 @@ def test_all_that_is_hidden_is_shown() -> None:
     assert [m.hidden for m in shown.meshes] == [False, False]
     assert shown.meshes[0] is document.meshes[0]
     assert show_all(document) is document
+    bald = set_groom_hidden(document, document.grooms[0].id, True)
+    assert bald.grooms[0].hidden
+    assert not any(g.hidden for g in show_all(bald).grooms)
 
 
 def test_isolating_and_ghosting_go_and_come_back() -> None:

@@ -6,12 +6,14 @@ import pytest
 from core.document import Document, MeshObject
 from core.evaluator import Evaluator
 from core.groom.dress import dress
+from core.groom.groom import Groom
 from core.groom.grow import grow
+from core.groom.rows import no_guides
 from core.groom.style import load_style
 from core.mesh.skin import skin_at_rest
 from core.value import constant, formula
 from tests.documents import grid_mesh
-from viewport.document_scene import scene_of
+from viewport.document_scene import SKIN, scene_of
 from viewport.drawables.strands import strand_tints
 from viewport.scene import mean_width, thinned
 
@@ -49,6 +51,18 @@ def test_only_the_hairs_a_density_keeps_are_drawn(drawn):
     _, coat = drawn(density=formula("id % 2"), width_tip=formula("1e-4 * (1 + u)"))
     assert np.sort(coat.ids).tolist() == list(range(1, 500, 2))
     assert len(coat.widths) == 250
+
+
+def test_a_hidden_groom_is_not_drawn(drawn):
+    children, _ = drawn()
+    document = Document(
+        meshes=(MeshObject(id=1, name="sheet", mesh=grid_mesh(4)),),
+        grooms=(Groom(id=1, name="fur", mesh_id=1, guides=no_guides(4), hidden=True),))
+    evaluator = Evaluator()
+    scene = scene_of(document, {1: skin_at_rest(document.meshes[0].mesh, evaluator)}, {1: children})
+    evaluator.close()
+    assert (len(scene.surfaces), len(scene.coats)) == (1, 0)
+    assert scene.surfaces[0].color == SKIN
 
 
 def test_hairs_of_different_widths_are_drawn_so(drawn):

@@ -304,6 +304,10 @@ def test_hidden_isolated_ghosted_and_the_options_of_the_view(document, evaluator
 
     assert shown() == (2, 1, 1)
     assert shown(with_mesh(two, item.replace(hidden=True))) == (1, 0, 0)
+    bald = with_groom(two, two.grooms[0].replace(hidden=True))
+    assert shown(bald) == (2, 0, 0)
+    assert live.wanted_jobs() == []
+    assert shown() == (2, 1, 1)  # at once: its hair was kept
     assert shown(isolated=(3,)) == (1, 0, 0)
     assert shown(isolated=(2,)) == (1, 1, 1)
     assert shown(hair=False) == (2, 0, 1)

@@ -164,6 +164,12 @@ def test_eye_and_lock_are_steps(desk: Desk, tree: Outliner, qtbot: QtBot) -> Non
     assert [m.locked for m in desk.document.meshes] == [True, False]
     desk.session.undo()
     assert not desk.document.meshes[0].locked
+    click_button(tree, qtbot, groom(desk, 2), 0)
+    assert [g.hidden for g in desk.document.grooms] == [False, True, False]
+    assert [m.hidden for m in desk.document.meshes] == [False, False]
+    click_button(tree, qtbot, groom(desk, 3), 1)
+    assert [g.locked for g in desk.document.grooms] == [False, False, True]
+    assert desk.session.history.undo_name == "Lock"
     assert desk.workspace.groom is None  # a click on a button chooses nothing
 
 
@@ -231,7 +237,11 @@ def test_the_menu_isolates_ghosts_and_adds(desk: Desk, tree: Outliner, qtbot: Qt
     assert desk.document.grooms[-1].mesh_id == 8
     assert desk.workspace.groom == desk.document.grooms[-1].id
     run(menu(mesh(desk, 8)), "Hide")
+    run(menu(mesh(desk, 8)), "Lock")
     run(menu(groom(desk, 2)), "Lock")
+    run(menu(groom(desk, 2)), "Hide")
+    assert (groom(desk, 2).locked, groom(desk, 2).hidden) == (True, True)
+    assert [m.text() for m in menu(groom(desk, 2)).actions()][1:3] == ["Show", "Unlock"]
     assert mesh(desk, 8).hidden
     assert mesh(desk, 8).locked
     run(menu(groom(desk, 2)), "Delete")

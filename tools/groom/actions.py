@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from core.document import Document, MeshObject, find_mesh, with_groom
+from core.document import Document, MeshObject, mesh_to_edit, with_groom
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.field import field
@@ -148,11 +148,9 @@ def act(
     Raises
     ------
     UserError
-        The mesh is locked, or there is nothing to do it to.
+        The groom or its mesh is locked, the groom is hidden, or there is nothing to do it to.
     """
-    item = find_mesh(document, groom.mesh_id)
-    if item.locked:
-        raise UserError(f"{item.name} is locked; unlock it in the scene panel to edit its hair.")
+    item = mesh_to_edit(document, groom)
     before = groom.guides
     if len(before) == 0:
         raise UserError("This groom has no guides yet; plant some first (the Plant or Scatter tool).")
