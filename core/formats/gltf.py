@@ -40,10 +40,40 @@ class Primitive(msgspec.Struct):
     indices: int | None = None
     mode: int = TRIANGLES
     extensions: dict[str, Any] = {}
+    targets: list[dict[str, int]] = []
 
 
 class GltfMesh(msgspec.Struct):
     primitives: list[Primitive]
+    name: str = ""
+    weights: list[float] = []
+    extras: Any = None
+
+
+class Skin(msgspec.Struct, rename="camel"):
+    joints: list[int]
+    inverse_bind_matrices: int | None = None
+
+
+class Sampler(msgspec.Struct):
+    input: int
+    output: int
+    interpolation: str = "LINEAR"
+
+
+class Target(msgspec.Struct):
+    path: str
+    node: int | None = None
+
+
+class Channel(msgspec.Struct):
+    sampler: int
+    target: Target
+
+
+class Animation(msgspec.Struct):
+    channels: list[Channel] = []
+    samplers: list[Sampler] = []
     name: str = ""
 
 
@@ -56,6 +86,7 @@ class Node(msgspec.Struct):
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    weights: list[float] = []
 
 
 class Scene(msgspec.Struct):
@@ -67,6 +98,8 @@ class Gltf(msgspec.Struct, rename="camel"):
     scenes: list[Scene] = []
     nodes: list[Node] = []
     meshes: list[GltfMesh] = []
+    skins: list[Skin] = []
+    animations: list[Animation] = []
     accessors: list[Accessor] = []
     buffer_views: list[BufferView] = []
     buffers: list[Buffer] = []
@@ -83,6 +116,19 @@ def read_gltf(path: Path) -> Polygons:
     UserError
         Missing or foreign buffers, compressed geometry, nodes in a loop, counts that do not fit, no triangles.
     """
+    gltf, buffers = open_gltf(path)
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is found by the repair
+            pieces = _pieces(path, gltf, buffers)
+    except (IndexError, ValueError, OverflowError) as error:
+        raise UserError(f"{path.name} contradicts itself ({error}); export it again.") from None
+    if not pieces:
+        raise UserError(f"{path.name} has no triangles; export a polygon mesh.")
+    return join(pieces)
+
+
+def open_gltf(path: Path) -> tuple[Gltf, list[bytes]]:
+    """What a glTF file says and its buffers, nothing of it believed yet; UserError when it cannot be read."""
     text, chunk = _chunks(path)
     try:
         gltf = msgspec.json.decode(text, type=Gltf)
@@ -93,14 +139,7 @@ def read_gltf(path: Path) -> Polygons:
         if extension in UNREADABLE:
             raise UserError(f"{path.name} uses {UNREADABLE[extension]}; export it again without it.")
     buffers = [_buffer(path, buffer, chunk if row == 0 else None) for row, buffer in enumerate(gltf.buffers)]
-    try:
-        with np.errstate(all="ignore"):  # what is not finite is found by the repair
-            pieces = _pieces(path, gltf, buffers)
-    except (IndexError, ValueError, OverflowError) as error:
-        raise UserError(f"{path.name} contradicts itself ({error}); export it again.") from None
-    if not pieces:
-        raise UserError(f"{path.name} has no triangles; export a polygon mesh.")
-    return join(pieces)
+    return gltf, buffers
 
 
 def write_glb(path: Path, mesh: Mesh) -> None:
@@ -200,12 +239,13 @@ def _buffer(path: Path, buffer: Buffer, chunk: bytes | None) -> bytes:
 def _pieces(path: Path, gltf: Gltf, buffers: list[bytes]) -> list[Polygons]:
     pieces: list[Polygons] = []
     total = 0
-    placed = [(node, world) for node, world in _placed_nodes(path, gltf) if node.mesh is not None]
-    if sum(len(gltf.meshes[_row(node.mesh or 0)].primitives) for node, _ in placed) > MOST_PIECES:
+    nodes = [(gltf.nodes[row], world) for row, world in placed_nodes(path, gltf)]
+    placed = [(node, world) for node, world in nodes if node.mesh is not None]
+    if sum(len(gltf.meshes[checked_row(node.mesh or 0)].primitives) for node, _ in placed) > MOST_PIECES:
         raise UserError(f"{path.name} shows more than {MOST_PIECES:,} pieces; join them before the export.")
     for node, world in placed:
         assert node.mesh is not None
-        source = gltf.meshes[_row(node.mesh)]
+        source = gltf.meshes[checked_row(node.mesh)]
         name = node.name or source.name or "mesh"
         of_node: list[Polygons] = []
         transform = np.eye(4) if node.skin is not None else world
@@ -214,7 +254,7 @@ def _pieces(path: Path, gltf: Gltf, buffers: list[bytes]) -> list[Polygons]:
                 raise UserError(f"{path.name} uses {UNREADABLE[extension]}; export it again without it.")
             if primitive.mode not in (TRIANGLES, STRIP, FAN) or "POSITION" not in primitive.attributes:
                 continue
-            piece = _primitive(gltf, buffers, primitive, transform, name)
+            piece = read_primitive(gltf, buffers, primitive, transform, name)
             total += len(piece.corners)
             if total > MOST_CORNERS:
                 raise UserError(f"{path.name} shows more than {MOST_CORNERS // 3:,} triangles; export a smaller mesh.")
@@ -225,10 +265,10 @@ def _pieces(path: Path, gltf: Gltf, buffers: list[bytes]) -> list[Polygons]:
     return unique_names(pieces)
 
 
-def _placed_nodes(path: Path, gltf: Gltf) -> list[tuple[Node, NDArray[np.float64]]]:
-    """Every node the scene shows with its world matrix (4, 4); a node reached twice is a loop."""
+def placed_nodes(path: Path, gltf: Gltf) -> list[tuple[int, NDArray[np.float64]]]:
+    """Every node the scene shows, by row, with its world matrix (4, 4); a node reached twice is a loop."""
     if gltf.scenes:
-        roots = gltf.scenes[_row(gltf.scene)].nodes
+        roots = gltf.scenes[checked_row(gltf.scene)].nodes
     else:
         children = {child for node in gltf.nodes for child in node.children}
         roots = [row for row in range(len(gltf.nodes)) if row not in children]
@@ -240,14 +280,14 @@ def _placed_nodes(path: Path, gltf: Gltf) -> list[tuple[Node, NDArray[np.float64
         if row in seen:
             raise UserError(f"{path.name} has nodes that contain themselves; export it again.")
         seen.add(row)
-        node = gltf.nodes[_row(row)]
-        world = parent @ _local(node)
-        placed.append((node, world))
+        node = gltf.nodes[checked_row(row)]
+        world = parent @ local_matrix(node)
+        placed.append((row, world))
         waiting += [(child, world) for child in reversed(node.children)]
     return placed
 
 
-def _local(node: Node) -> NDArray[np.float64]:
+def local_matrix(node: Node) -> NDArray[np.float64]:
     """Matrix (4, 4) of a node, column vectors."""
     if node.matrix is not None:
         return np.array(node.matrix, np.float64).reshape(4, 4).T
@@ -263,17 +303,17 @@ def _local(node: Node) -> NDArray[np.float64]:
     return out
 
 
-def _row(index: int) -> int:
+def checked_row(index: int) -> int:
     if index < 0:
         raise IndexError("an index is negative")
     return index
 
 
-def _primitive(
+def read_primitive(
     gltf: Gltf, buffers: list[bytes], primitive: Primitive, world: NDArray[np.float64], name: str
 ) -> Polygons:
     def get(row: int, width: int) -> NDArray[np.float64]:
-        return read_accessor(gltf.accessors[_row(row)], gltf.buffer_views, buffers, width)
+        return read_accessor(gltf.accessors[checked_row(row)], gltf.buffer_views, buffers, width)
 
     points = get(primitive.attributes["POSITION"], 3) @ world[:3, :3].T + world[:3, 3]
     index = np.arange(len(points))

@@ -40,7 +40,7 @@ def read_in_child(path: str) -> dict[str, Any]:
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdGeom.Mesh):
             continue
-        piece = _piece(prim, time, np.array(transforms.GetLocalToWorldTransform(prim)))
+        piece = mesh_piece(prim, time, np.array(transforms.GetLocalToWorldTransform(prim)))
         if piece is None:
             continue
         image = UsdGeom.Imageable(prim)
@@ -104,7 +104,7 @@ def write_usd(path: Path, mesh: Mesh) -> None:
         raise UserError(f"{path.name} could not be written; choose another folder.")
 
 
-def _piece(prim: Any, time: Any, world: NDArray[np.float64]) -> Polygons | None:
+def mesh_piece(prim: Any, time: Any, world: NDArray[np.float64]) -> Polygons | None:
     from pxr import UsdGeom
 
     mesh = UsdGeom.Mesh(prim)

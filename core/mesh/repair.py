@@ -48,7 +48,7 @@ class Repaired(NamedTuple):
     closed: bool
 
 
-def repair(polygons: Polygons) -> Repaired:
+def repair(polygons: Polygons, kinds: NDArray[np.generic] | None = None) -> Repaired:
     """Make a sound mesh of any polygons.
 
     Faces that cannot be used are left out; coincident vertices are joined only where that pairs two open
@@ -56,6 +56,10 @@ def repair(polygons: Polygons) -> Repaired:
     piece are turned to agree with most of it, and outwards where the piece is closed. Vertices keep their
     order; those joined to an earlier one disappear. A vertex that is not finite is moved to the middle of the
     others. Faces without area stay, because leaving them out would open a seam.
+
+    Parameters
+    ----------
+    kinds : (V,) numbers; vertices of different kinds are never joined. None when all are of one kind.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def repair(polygons: Polygons) -> Repaired:
     kept = _usable_faces(polygons, bad, met)
     faces = _take_faces(polygons, kept)
     edges = Edges.of(faces.counts, faces.corners, len(points))
-    vertex_of_source = _join_open_edges(points, faces.counts, faces.corners, faces.parts, edges, met)
+    vertex_of_source = _join_open_edges(points, faces.counts, faces.corners, faces.parts, edges, met, kinds)
     stays = vertex_of_source == np.arange(len(points))
     if not stays.all():
         vertex_of_source = (np.cumsum(stays) - 1)[vertex_of_source]
@@ -201,6 +205,7 @@ def _join_open_edges(
     parts: NDArray[np.int32],
     edges: Edges,
     met: dict[str, int],
+    kinds: NDArray[np.generic] | None,
 ) -> NDArray[np.int64]:
     """Where each vertex goes, (V,): itself, or the first of those it coincides with along two open edges of a part."""
     same = np.arange(len(points))
@@ -214,6 +219,9 @@ def _join_open_edges(
     used = np.flatnonzero(mark)
     place_of = np.zeros(len(points), np.int64)
     place_of[used] = _places(points[used])
+    if kinds is not None:
+        kind = np.unique(kinds[used], return_inverse=True)[1].ravel()
+        place_of[used] = np.unique(place_of[used] * (kind.max() + 1) + kind, return_inverse=True)[1].ravel()
     places = int(place_of.max()) + 1
     if places == len(used):
         return same

@@ -1,0 +1,103 @@
+"""Rigs in, by the suffix of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from core.errors import UserError
+from core.formats import bvh, gltf_rig, tgf
+from core.formats.file_space import axis_of, metres_of
+from core.formats.rig_assembly import RigFile, assemble
+from core.formats.rig_parts import RawRig, unpack_rig
+from core.formats.sandbox import run_bounded
+
+Say = Callable[[str], None]
+SECONDS, MEMORY = 120.0, 8 << 30  # limits of a native reader
+LARGEST_FILE = 4 << 30  # bytes
+DAMAGE = (ValueError, IndexError, KeyError, OverflowError, RecursionError, np.linalg.LinAlgError)
+
+NATIVE = {
+    ".usd": "core.formats.usd_rig:read_in_child", ".usda": "core.formats.usd_rig:read_in_child",
+    ".usdc": "core.formats.usd_rig:read_in_child", ".usdz": "core.formats.usd_rig:read_in_child",
+    ".fbx": "core.formats.fbx:read_in_child",
+}  # fmt: skip
+READERS: dict[str, Callable[[Path], RawRig]] = {
+    ".glb": gltf_rig.read_raw, ".gltf": gltf_rig.read_raw, ".bvh": bvh.read_raw, ".tgf": tgf.read_raw,
+}  # fmt: skip
+READ_SUFFIXES = (*NATIVE, *READERS)
+
+
+def read_rig(
+    path: str | Path, unit: str | None = None, up: str | None = None, say: Say | None = None,
+    sandboxed: bool = True, cancel: Callable[[], bool] | None = None,
+) -> RigFile:
+    """Read skeletons, skins, blend shapes and clips of any known format.
+
+    Parameters
+    ----------
+    unit, up : unit (m, cm, mm, in, ft) and up axis (y, z) of a file that does not say; what a file says wins.
+    say : called with each sentence of the notes.
+    sandboxed : run native readers in a child process. False only for files this program has just written.
+    cancel : asked now and then while a native reader works.
+
+    Raises
+    ------
+    NoRig
+        When nothing in the file moves.
+    UserError
+        One sentence: an unknown format, a file that is missing or damaged, a rig that contradicts itself.
+    """
+    path = Path(path)
+    _must_be_readable(path)
+    metres_given = None if unit is None else metres_of(unit)
+    up_given = None if up is None else axis_of(up)
+    try:
+        raw = _read(path, sandboxed, cancel)
+        with np.errstate(all="ignore"):  # what is not finite is found by the checks
+            found = assemble(raw, path.stem or "rig", metres_given, up_given)
+    except DAMAGE as error:
+        raise UserError(f"{path.name} is damaged and cannot be read; export it again.") from error
+    except MemoryError:
+        raise UserError(f"{path.name} is too large for the memory of this machine.") from None
+    except UserError as error:
+        if path.name in str(error):
+            raise
+        raise type(error)(f"{path.name}: {error}") from error
+    for note in found.notes if say is not None else ():
+        assert say is not None
+        say(note)
+    return found
+
+
+def _must_be_readable(path: Path) -> None:
+    if path.suffix.lower() not in READ_SUFFIXES:
+        raise UserError(f"{path.name} is no rig format that is known; use {', '.join(READ_SUFFIXES)}.")
+    try:
+        if not path.is_file():
+            raise UserError(f"{path.name} is {'a folder' if path.is_dir() else 'not there'}; give the name of a file.")
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            file.read(1)
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path.name[:80]} cannot be opened ({getattr(error, 'strerror', None) or error}).") from None
+    if not size:
+        raise UserError(f"{path.name} is empty; export it again.")
+    if size > LARGEST_FILE:
+        raise UserError(f"{path.name} is larger than {LARGEST_FILE >> 30} GB; export a smaller rig.")
+
+
+def _read(path: Path, sandboxed: bool, cancel: Callable[[], bool] | None) -> RawRig:
+    suffix = path.suffix.lower()
+    if suffix in READERS:
+        return READERS[suffix](path)
+    where = {"path": str(path.resolve())}
+    if not sandboxed and suffix != ".fbx":
+        from core.formats import usd_rig
+
+        return unpack_rig(usd_rig.read_in_child(**where))
+    return unpack_rig(
+        run_bounded(NATIVE[suffix], where, what=path.name, seconds=SECONDS, memory=MEMORY, cancel=cancel)
+    )

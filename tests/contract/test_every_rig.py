@@ -1,0 +1,298 @@
+"""Every rig of the shared data is read and moves as its own library says: UsdSkel's baked points, glTF by the book."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from scipy.spatial.transform import Rotation, Slerp
+
+from core.errors import UserError
+from core.formats.rig_assembly import NoRig
+from core.formats.rig_file import READ_SUFFIXES, read_rig
+from core.pose.clip import local_matrices, numbers_at
+from core.pose.rig import Rig, all_clips, playing
+from core.pose.skinning import deformed, posed_points
+
+DATA = Path(os.environ.get("FILOPLUME_DATA", "../shared/data"))
+ANIMATION = DATA / "animation"
+BAKE = ANIMATION / "usdskel_bake/usdSkel/testenv/testUsdSkelBakeSkinning"
+RIGS = sorted(p.relative_to(ANIMATION).as_posix() for p in ANIMATION.rglob("*") if p.suffix in READ_SUFFIXES)
+BARE = ("badSkelBindingAPIApplied.usda", "badSkelBindingNoSkelRoot.usda")
+
+pytestmark = pytest.mark.skipif(not ANIMATION.is_dir(), reason="the shared data are not there")
+
+
+def in_file_order(rig: Rig, points: np.ndarray) -> np.ndarray:
+    return points if rig.file_vertices is None else points[rig.file_vertices]
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_it_is_read_and_stays_finite(name):
+    if name.endswith(BARE):
+        with pytest.raises(NoRig, match=r"no skeleton"):
+            read_rig(ANIMATION / name)
+        return
+    said: list[str] = []
+    found = read_rig(ANIMATION / name, say=said.append)
+    assert tuple(said) == found.notes
+    assert found.clips == all_clips(found.rig)
+    if found.mesh is None:
+        assert found.rig.skeleton.names
+        return
+    assert len(found.mesh.points) == len(found.rig.skin.joints)
+    size = np.ptp(found.mesh.points, axis=0).max()
+    for clip in found.clips:
+        rig = playing(found.rig, clip.name)
+        for frame in np.linspace(clip.start, clip.end, 5):
+            points = posed_points(found.mesh.points, rig, frame)
+            assert np.isfinite(points).all()
+            assert np.ptp(points, axis=0).max() < 10 * size
+
+
+BAKED = [
+    ("lbs.usda", "lbs.baked.usda"), ("dqs.usda", "dqs.baked.usda"), ("lbs.usda", "lbs.bakedInterval.usda"),
+    ("dqs.usda", "dqs.bakedInterval.usda"), ("blendshapes.usda", "blendshapes.baked.usda"),
+    ("blendshapesWithNormals.usda", "blendshapesWithNormals.baked.usda"),
+]  # fmt: skip
+
+
+def baked_points(path: Path, frame: float) -> np.ndarray:
+    """The points of all meshes of a stage at a time, in its space, one mesh after another."""
+    stage = Usd.Stage.Open(str(path))
+    rows = []
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            world = np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(frame))
+            rows.append(np.array(UsdGeom.Mesh(prim).GetPointsAttr().Get(frame)) @ world[:3, :3] + world[3, :3])
+    return np.concatenate(rows)
+
+
+@pytest.mark.parametrize(("source", "baked"), BAKED)
+def test_every_frame_is_as_usdskel_baked_it(source, baked):
+    found = read_rig(BAKE / source)
+    times = sorted({
+        t for prim in Usd.Stage.Open(str(BAKE / "baseline" / baked)).Traverse() if prim.IsA(UsdGeom.Mesh)
+        for t in UsdGeom.Mesh(prim).GetPointsAttr().GetTimeSamples()
+    })
+    assert len(times) > 9
+    worst = moved = 0.0
+    still = in_file_order(found.rig, found.mesh.points)
+    truths = [baked_points(BAKE / "baseline" / baked, time) for time in times]
+    own = np.ones(len(still), bool)
+    if source == "blendshapes.usda":  # its first mesh is the truth of the second, and no part of the rig
+        own[: len(still) // 2] = False
+    for time, truth in zip(times, truths):
+        points = in_file_order(found.rig, posed_points(found.mesh.points, found.rig, time))
+        worst = max(worst, np.abs(points - truth)[own].max() / np.ptp(truth, axis=0).max())
+        moved = max(moved, np.abs(points - still)[own].max())
+    assert worst <= 1e-5
+    assert moved > 0.1
+
+
+def gltf_points(path: Path, clip: int, seconds: float) -> np.ndarray:
+    """Points of all primitives by the letter of the glTF specification, one vertex after another; slow and plain."""
+    data = path.read_bytes()
+    if data[:4] == b"glTF":
+        length = int.from_bytes(data[12:16], "little")
+        doc, chunk = json.loads(data[20 : 20 + length]), data[28 + length :]
+    else:
+        doc, chunk = json.loads(data), b""
+    buffers = [
+        chunk if "uri" not in b else base64.b64decode(b["uri"].split(",")[1]) if b["uri"].startswith("data:")
+        else (path.parent / b["uri"]).read_bytes() for b in doc["buffers"]
+    ]
+    kinds = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+    widths = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+    def plain(view, offset, count, kind, width):
+        v = doc["bufferViews"][view]
+        step = v.get("byteStride", np.dtype(kind).itemsize * width)
+        at = v.get("byteOffset", 0) + offset
+        return np.array([np.frombuffer(buffers[v["buffer"]], kind, width, at + i * step) for i in range(count)])
+
+    def numbers(row):
+        a = doc["accessors"][row]
+        kind, width = kinds[a["componentType"]], widths[a["type"]]
+        if "bufferView" in a:
+            out = plain(a["bufferView"], a.get("byteOffset", 0), a["count"], kind, width).astype(float)
+        else:
+            out = np.zeros((a["count"], width))
+        if "sparse" in a:
+            s = a["sparse"]
+            rows = plain(s["indices"]["bufferView"], s["indices"].get("byteOffset", 0), s["count"],
+                         kinds[s["indices"]["componentType"]], 1)[:, 0]
+            out[rows] = plain(s["values"]["bufferView"], s["values"].get("byteOffset", 0), s["count"], kind, width)
+        return out / np.iinfo(kind).max if a.get("normalized") else out
+
+    nodes = [dict(n) for n in doc["nodes"]]
+    for channel in doc["animations"][clip]["channels"]:
+        sampler = doc["animations"][clip]["samplers"][channel["sampler"]]
+        times, values = numbers(sampler["input"])[:, 0], numbers(sampler["output"]).reshape(-1)
+        each = len(values) // len(times)
+        values = values.reshape(len(times), each)
+        t = np.clip(seconds, times[0], times[-1])
+        i = min(max(np.searchsorted(times, t + 1e-6, side="right") - 1, 0), len(times) - 1)
+        k = min(i + 1, len(times) - 1)
+        p = 0.0 if i == k else (t - times[i]) / (times[k] - times[i])
+        mode = sampler.get("interpolation", "LINEAR")
+        assert mode in ("LINEAR", "STEP")
+        if mode == "STEP":
+            p = 0.0
+        a, b = values[i], values[k]
+        if channel["target"]["path"] == "rotation":
+            value = a if p <= 0 else Slerp([0, 1], Rotation.from_quat([a, b]))(min(p, 1.0)).as_quat()
+        else:
+            value = a + p * (b - a)
+        nodes[channel["target"]["node"]][channel["target"]["path"]] = list(value)
+
+    def local(n):
+        if "matrix" in n:
+            return np.array(n["matrix"]).reshape(4, 4).T
+        m = np.eye(4)
+        turn = Rotation.from_quat(n.get("rotation", [0, 0, 0, 1])).as_matrix()
+        m[:3, :3] = turn * np.array(n.get("scale", [1, 1, 1]))
+        m[:3, 3] = n.get("translation", [0, 0, 0])
+        return m
+
+    worlds, order = {}, []
+
+    def walk(row, above):
+        worlds[row] = above @ local(nodes[row])
+        order.append(row)
+        for child in nodes[row].get("children", []):
+            walk(child, worlds[row])
+
+    for root in doc["scenes"][doc.get("scene", 0)]["nodes"]:
+        walk(root, np.eye(4))
+    rows = []
+    for row in order:
+        if "mesh" not in nodes[row]:
+            continue
+        mesh = doc["meshes"][nodes[row]["mesh"]]
+        shares = nodes[row].get("weights", mesh.get("weights", []))
+        for primitive in mesh["primitives"]:
+            points = numbers(primitive["attributes"]["POSITION"])
+            for share, target in zip(shares, primitive.get("targets", [])):
+                points = points + share * numbers(target["POSITION"])
+            whole = np.column_stack([points, np.ones(len(points))])
+            if "skin" not in nodes[row]:
+                rows.append((whole @ worlds[row].T)[:, :3])
+                continue
+            skin = doc["skins"][nodes[row]["skin"]]
+            inverse = numbers(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
+            matrices = [worlds[j] @ inverse[k] for k, j in enumerate(skin["joints"])]
+            out, total = np.zeros((len(points), 3)), np.zeros(len(points))
+            number = 0
+            while f"JOINTS_{number}" in primitive["attributes"]:
+                joints = numbers(primitive["attributes"][f"JOINTS_{number}"]).astype(int)
+                weights = numbers(primitive["attributes"][f"WEIGHTS_{number}"])
+                for c in range(4):
+                    m = np.array(matrices)[joints[:, c]]
+                    out += weights[:, c : c + 1] * np.einsum("vij,vj->vi", m, whole)[:, :3]
+                    total += weights[:, c]
+                number += 1
+            rows.append(out / total[:, None])
+    return np.concatenate(rows)
+
+
+GLTF = [n for n in RIGS if n.endswith(("gltf", "glb")) and "quad_skin" not in n]
+
+
+@pytest.mark.parametrize("name", GLTF)
+def test_every_clip_is_as_the_specification_says(name):
+    found = read_rig(ANIMATION / name)
+    for number, clip in enumerate(found.clips):
+        rig = playing(found.rig, clip.name)
+        moved = 0.0
+        for frame in np.unique(np.linspace(clip.start, clip.end, 14).round()):
+            points = in_file_order(rig, posed_points(found.mesh.points, rig, frame))
+            truth = gltf_points(ANIMATION / name, number, frame / clip.frames_per_second)
+            assert np.abs(points - truth).max() <= 1e-5 * np.ptp(truth, axis=0).max()
+            moved = max(moved, np.abs(points - in_file_order(rig, found.mesh.points)).max())
+        assert moved > 1e-3
+
+
+def test_a_foxs_seams_are_welded_and_its_own_order_is_kept():
+    found = read_rig(ANIMATION / "fox_gltf/animated/Fox.glb")
+    assert len(found.rig.file_vertices) == 1728
+    assert len(found.mesh.points) < 400
+    assert {clip.name for clip in found.clips} == {"Survey", "Walk", "Run"}
+    with pytest.raises(UserError, match="Survey"):
+        playing(found.rig, "Gallop")
+
+
+def test_numbers_of_a_clip_drive_the_shapes():
+    found = read_rig(BAKE / "blendshapes.usda")
+    clip = found.clips[0]
+    numbers = numbers_at(clip, 6)
+    assert numbers["targetC"] == pytest.approx(0.5)
+    by_hand = deformed(found.mesh.points, found.rig, local_matrices(clip, 6), {"targetC": 0.5})
+    assert np.allclose(by_hand, posed_points(found.mesh.points, found.rig, 6), atol=1e-6)
+    dial = found.rig.controls[2]
+    assert (dial.name, dial.rest, dial.low, dial.high) == ("targetC", 0.0, 0.0, 1.5)
+
+
+def test_usd_with_eight_influences_scaled_root_and_z_up(tmp_path):
+    """A stage made here: its own SkinningQuery is the truth, through units, axes and a transform above the skeleton."""
+    rng = np.random.default_rng(3)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "rig.usda"))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    stage.SetTimeCodesPerSecond(30)
+    root = UsdSkel.Root.Define(stage, "/r")
+    UsdGeom.Xformable(root).AddTransformOp().Set(
+        Gf.Matrix4d().SetScale(3.0) * Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 2, 3), 40))
+        * Gf.Matrix4d().SetTranslate(Gf.Vec3d(4, 5, 6)))
+    skel = UsdSkel.Skeleton.Define(stage, "/r/skel")
+    tokens = ["a", "a/b", "a/b/c", "a/d", "a/d/e", "f", "f/g", "f/h", "f/h/i", "f/h/i/j"]
+    skel.CreateJointsAttr(tokens)
+
+    def some():
+        q = Gf.Quatd(*rng.normal(size=4)).GetNormalized()
+        return (Gf.Matrix4d().SetScale(Gf.Vec3d(*rng.uniform(0.5, 2, 3))) * Gf.Matrix4d().SetRotate(q)
+                * Gf.Matrix4d().SetTranslate(Gf.Vec3d(*rng.normal(size=3) * 10)))
+
+    skel.CreateRestTransformsAttr([some() for _ in tokens])
+    skel.CreateBindTransformsAttr([some() for _ in tokens])
+    anim = UsdSkel.Animation.Define(stage, "/r/anim")
+    order = tokens[::-1]
+    anim.CreateJointsAttr(order)
+    for frame in (10, 20):
+        anim.CreateTranslationsAttr().Set([Gf.Vec3f(*rng.normal(size=3) * 10) for _ in order], frame)
+        anim.CreateRotationsAttr().Set([Gf.Quatf(Gf.Quatd(*rng.normal(size=4)).GetNormalized()) for _ in order], frame)
+        anim.CreateScalesAttr().Set([Gf.Vec3h(*rng.uniform(0.5, 2, 3)) for _ in order], frame)
+    UsdSkel.BindingAPI.Apply(skel.GetPrim()).CreateAnimationSourceRel().SetTargets([anim.GetPath()])
+    mesh = UsdGeom.Mesh.Define(stage, "/r/mesh")
+    points = (rng.normal(size=(60, 3)) * 20).astype(np.float32)
+    mesh.CreatePointsAttr(points)
+    mesh.CreateFaceVertexCountsAttr([3] * 20)
+    mesh.CreateFaceVertexIndicesAttr(list(range(60)))
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+    binding.CreateSkeletonRel().SetTargets([skel.GetPath()])
+    binding.CreateGeomBindTransformAttr(some())
+    mine = [tokens[k] for k in (9, 3, 5, 0, 7, 2, 8, 1, 4)]
+    binding.CreateJointsAttr(mine)
+    binding.CreateJointIndicesPrimvar(False, 8).Set(np.argsort(rng.random((60, 9)), axis=1)[:, :8].ravel().tolist())
+    binding.CreateJointWeightsPrimvar(False, 8).Set(rng.dirichlet(np.ones(8), 60).ravel().tolist())
+    stage.Save()
+
+    cache = UsdSkel.Cache()
+    cache.Populate(root, Usd.TraverseInstanceProxies())
+    found = read_rig(tmp_path / "rig.usda")
+    assert found.rig.skin.joints.shape[1] == 8
+    assert (found.metres_per_unit, found.up, found.clips[0].frames_per_second) == (0.01, "z", 30.0)
+    world = np.array(UsdGeom.Imageable(skel).ComputeLocalToWorldTransform(0))
+    for frame in (10, 20):
+        query, skinning = cache.GetSkelQuery(skel), cache.GetSkinningQuery(mesh.GetPrim())
+        truth = Vt.Vec3fArray.FromNumpy(points.copy())
+        assert skinning.ComputeSkinnedPoints(query.ComputeSkinningTransforms(frame), truth, frame)
+        truth = (np.array(truth, np.float64) @ world[:3, :3] + world[3, :3]) * 0.01
+        truth = truth[:, [0, 2, 1]] * [1, 1, -1]
+        points_now = posed_points(found.mesh.points, found.rig, frame)
+        assert np.abs(points_now - truth).max() <= 2e-5 * np.ptp(truth, axis=0).max()
