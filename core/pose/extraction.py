@@ -68,7 +68,7 @@ def condition_numbers(matrices: Array) -> Array:
     angle = np.arccos(np.clip(0.5 * _determinant(unit), -1.0, 1.0)) / 3.0
     largest = mean + 2.0 * spread * np.cos(angle)
     smallest = mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)
-    safe = smallest > 1e-4 * largest
+    safe = smallest > 1e-2 * largest
     out = np.full(len(matrices), np.inf)
     out[safe] = np.sqrt(largest[safe] / smallest[safe])
     if not safe.all():

@@ -100,8 +100,8 @@ def pose_of_local(
     rest = quaternion_from_matrix(rest_rotations(skeleton))
     turned = relative(rest, quaternion_from_matrix(polar_rotation(m[:, :3, :3])))
     slid = m[:, :3, 3] - skeleton.rest[:, :3, 3]
-    rotations: dict[str, Quaternion] = msgspec.field(default_factory=dict)
-    translations: dict[str, Vector] = msgspec.field(default_factory=dict)
+    rotations: dict[str, Quaternion] = {}
+    translations: dict[str, Vector] = {}
     for j, joint in enumerate(skeleton.names):
         if np.linalg.norm(turned[j, :3]) > SAME:
             x, y, z, w = map(float, turned[j])

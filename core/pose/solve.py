@@ -113,13 +113,13 @@ def solve_centres(
     system = _system(matrix, centres, plane, settings.smoothing)
     if not symmetric:
         _refuse_turned(matrix, system, centres, usual, phi, plane, settings, names)
-    inverse, least = _inverse(system, names)
+    inverse, least, weakest = _inverse(system, names)
     if symmetric and settings.table and settings.kernel in POSITIVE and np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise Refusal("singular", names, "the table of the kernel is too coarse for them; give it more entries")
     inverse = inverse[:, :count]
     loss = np.abs(_columns(centres, centres, each, phi, plane) @ inverse - np.eye(count)).max(axis=1, initial=0.0)
     if settings.smoothing == 0.0 and loss.max() > MOST_LOSS:
-        raise Refusal("singular", _guilty(loss, names))
+        raise Refusal("singular", _guilty(weakest, names))
     return Solved(dofs, settings, names, silent, centres, each, inverse, plane, least, loss)
 
 
@@ -173,8 +173,9 @@ def _system(matrix: Array, centres: Array, plane: Plane | None, smoothing: float
     return system
 
 
-def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float]:
-    """The inverse and the reciprocal condition, from one decomposition."""
+def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float, Array]:
+    """The inverse, the reciprocal condition, and how much of each pose is in the weakest direction, all from one
+    decomposition."""
     left, sizes, right = np.linalg.svd(system)
     right = right.T
     largest = sizes.max()
@@ -183,7 +184,7 @@ def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float]:
         # all directions that are lost, not one of them: three poses in one place lose two
         lost = right[: len(names), sizes < max(LEAST_CONDITION * largest, 2.0 * sizes.min())]
         raise Refusal("singular", _guilty(np.linalg.norm(lost, axis=1), names))
-    return (right / sizes) @ left.T, least
+    return (right / sizes) @ left.T, least, np.abs(right[: len(names), -1])
 
 
 def _refuse_twins(squared: Array, names: tuple[str, ...]) -> None:
