@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import ctypes
 import os
 import shutil
+import signal
 import subprocess
+from contextlib import suppress
 
 SIZE = "1920x1200x24"
 
@@ -20,7 +23,7 @@ def ensure_display() -> str | None:
         return "there is no display and no Xvfb: sudo apt install xvfb openbox"
     read, write = os.pipe()
     command = [server, "-displayfd", str(write), "-screen", "0", SIZE, "-nolisten", "tcp"]
-    process = subprocess.Popen(command, pass_fds=(write,), stderr=subprocess.DEVNULL)
+    process = _started(command, write)
     os.close(write)
     with os.fdopen(read) as told:
         number = told.readline().strip()
@@ -28,8 +31,20 @@ def ensure_display() -> str | None:
     os.environ["DISPLAY"] = f":{number}"
     manager = shutil.which("openbox")
     if manager is not None:
-        atexit.register(_end, subprocess.Popen([manager], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        atexit.register(_end, _started([manager]))
     return None
+
+
+def _started(command: list[str], *files: int) -> subprocess.Popen[bytes]:
+    quiet = subprocess.DEVNULL  # whoever waits for the output of the tests shall not wait for the display
+    return subprocess.Popen(
+        command, pass_fds=files, stdin=quiet, stdout=quiet, stderr=quiet, preexec_fn=_die_with_parent)  # noqa: PLW1509
+
+
+def _die_with_parent() -> None:
+    """Tests that are killed leave no display behind (Linux)."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(1, signal.SIGTERM)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -14,6 +14,8 @@ from app.window.keymap import Navigation
 from core import navigate
 from core.camera import Camera, frame_points, ray_through
 from core.mesh.bvh import cast_rays
+from core.mesh.mesh import Mesh
+from core.mesh.skin import skin_at_rest
 from core.mesh.surface import strands_on_deformed
 from core.posed import skin_at
 from tools.scene import active_mesh
@@ -23,6 +25,7 @@ Array = NDArray[np.float64]
 TURN = 0.0075  # radians for a pixel of Qt's
 PULL = 0.006  # of a dolly, in powers of e for a pixel
 NOTCH = 0.86  # of the distance is left after a notch of the wheel
+AHEAD = (0.0, 0.0, 1.0)
 LENS = 0.5  # radians, the vertical field of view to begin with
 
 
@@ -31,13 +34,19 @@ class Eye:
 
     Parameters
     ----------
-    size : of the picture in pixels of the framebuffer. ratio : of these to pixels of Qt.
+    size : of the picture in pixels of the framebuffer. ratio : of these to pixels of Qt. changed : called when the
+        camera of a workspace without one has become another.
     """
 
-    def __init__(self, desk: Desk, size: Callable[[], tuple[int, int]], ratio: Callable[[], float]) -> None:
-        self.desk, self.size, self.ratio = desk, size, ratio
+    def __init__(
+        self, desk: Desk, size: Callable[[], tuple[int, int]], ratio: Callable[[], float],
+        changed: Callable[[], object],
+    ) -> None:
+        self.desk, self.size, self.ratio, self.changed = desk, size, ratio, changed
         self._pivot: Array | None = None
         self._corners: tuple[object, Array] | None = None
+        self._front: tuple[Mesh, tuple[float, float, float]] | None = None
+        self._looking: Mesh | None = None
 
     @property
     def camera(self) -> Camera:
@@ -45,11 +54,13 @@ class Eye:
         cameras = self.desk.workspace.cameras
         if cameras:
             return cameras[0]
-        camera = frame_points(
-            self.points(), self._direction("three-quarter"), self._aspect(), field_of_view=LENS)
+        camera = frame_points(self.points(), self._direction("three-quarter"), self._aspect(), field_of_view=LENS)
         camera = navigate.with_clipping(camera, self.corners())
         if self.desk.document.meshes:
-            self.desk.set_workspace(cameras=(camera,))
+            if self.facing is None:
+                self._find_front()  # and this camera is only for as long as that takes
+            else:
+                self.desk.set_workspace(cameras=(camera,))
         return camera
 
     def look(self, camera: Camera) -> None:
@@ -58,9 +69,11 @@ class Eye:
         self.desk.set_workspace(cameras=(clipped, *self.desk.workspace.cameras[1:]))
 
     def look_from(self, side: str) -> None:
-        """Turn to one of the sides of the animal, about what was looked at."""
-        pivot = self.pivot
-        self.look(navigate.turned_to(self.camera, pivot, self._direction(side)))
+        """Turn to one of the sides of the animal, about what was looked at; the first time when its front is found."""
+        if self.facing is None:
+            self._find_front(lambda: self.look_from(side))
+        else:
+            self.look(navigate.turned_to(self.camera, self.pivot, self._direction(side)))
 
     def frame_all(self) -> None:
         """Come so near or far that everything just fits."""
@@ -160,10 +173,37 @@ class Eye:
         width, height = self.size()
         return width / height
 
+    @property
+    def facing(self) -> tuple[float, float, float] | None:
+        """Where the active animal looks, (x, 0, z) unit; None until it was found out, straight on without one."""
+        item = active_mesh(self.desk.document, self.desk.workspace)
+        if item is None:
+            return AHEAD
+        return self._front[1] if self._front is not None and self._front[0] is item.mesh else None
+
+    def _find_front(self, then: Callable[[], object] = lambda: None) -> None:
+        """Find out in a job where the animal looks; that takes a moment on the way over its whole skin."""
+        item = active_mesh(self.desk.document, self.desk.workspace)
+        if item is None or self._looking is item.mesh:
+            return
+        mesh, evaluator = item.mesh, self.desk.session.evaluator
+        self._looking = mesh
+
+        def done(front: tuple[float, float, float]) -> None:
+            self._front, self._looking = (mesh, front), None
+            then()
+            self.changed()
+
+        def failed(error: Exception) -> None:
+            done(AHEAD)
+
+        self.desk.jobs.start(
+            f"Look at {item.name}", lambda progress, cancelled: turned_view(AHEAD, skin_at_rest(mesh, evaluator)), done,
+            failed)
+
     def _direction(self, side: str) -> tuple[float, float, float]:
-        document, view = self.desk.document, navigate.SIDES[side]
-        item = active_mesh(document, self.desk.workspace)
-        return view if item is None else turned_view(view, skin_at(item, None, self.desk.session.evaluator))
+        (x, y, z), (right, _, front) = navigate.SIDES[side], self.facing or AHEAD
+        return front * x + right * z, y, front * z - right * x
 
 
 class CameraDrag:

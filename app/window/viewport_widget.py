@@ -72,7 +72,7 @@ class Viewport(QOpenGLWindow):
         self.setFormat(surface_format())
         self.desk = desk
         self.playing = False
-        self.eye = Eye(desk, self.pixels, self.devicePixelRatio)
+        self.eye = Eye(desk, self.pixels, self.devicePixelRatio, self.redraw)
         self.gestures = Gestures(desk, self.eye, hotkeys, commands, window)
         self.picture: LivePicture | None = None
         self.frames = self.refined_frames = 0
@@ -122,7 +122,7 @@ class Viewport(QOpenGLWindow):
     def at_rest(self) -> bool:
         """True when the picture is finished and nothing more will change it."""
         picture = self.picture
-        return picture is not None and picture.settled and not self._stale and not self._rest.isActive()
+        return picture is not None and picture.settled and not self.pending and not self._rest.isActive()
 
     def scale_density(self, factor: float) -> None:
         """Draw so many times as many hairs while the hand moves."""

@@ -1,4 +1,4 @@
-"""Starting the program as a person does: a process with a display, without one, with old OpenGL; killed, started anew."""
+"""Starting the program as people do: a process with a display, without one, with old OpenGL; killed, begun anew."""
 
 from __future__ import annotations
 

@@ -1,0 +1,128 @@
+"""The main window: what commands ask of it, what it shows of a document, what it keeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+
+from app.window.commands import Window
+from app.window.settings import load_settings
+from app.window.theme import look_of
+from app.window.window_commands import PANELS
+from core.document import Document
+from core.formats.journal import state_folder
+from core.formats.project import read_project
+from core.formats.recovery import abandoned, recover
+from tests.window.conftest import Opened
+from tests.window.hand import CTRL, Hand
+
+BACK, ASIDE = (0.60, 0.42), (0.68, 0.36)
+
+
+def test_it_has_everything_commands_ask_for(opened: Opened) -> None:
+    window = opened().window
+    asked = [name for name in vars(Window) if not name.startswith("_")] + list(Window.__annotations__)
+    assert [name for name in asked if not hasattr(window, name)] == []
+
+
+def test_an_empty_document_shows_doors_and_a_mesh_the_view(opened: Opened, animal: Document) -> None:
+    window = opened().window
+    assert window.doors.isVisible()
+    window.desk.edit("Import mesh", lambda d: d.replace(meshes=animal.meshes))
+    assert not window.doors.isVisible()
+    assert window.view.isVisible()
+    window.commands.run("edit.undo")
+    assert window.doors.isVisible()
+
+
+def test_the_title_and_the_top_say_whether_work_is_saved(hand: Hand, tmp_path: Path) -> None:
+    window = hand.window
+    assert not window.isWindowModified()
+    hand.drag(BACK, ASIDE)
+    assert window.isWindowModified()
+    window.files.save_as(tmp_path / "mine.filo")
+    assert not window.isWindowModified()
+    assert "mine.filo" in window.windowTitle()
+    assert "mine.filo" in window.top.file.text()
+    assert "saved" in window.top.file.text()
+    saved, _ = read_project(tmp_path / "mine.filo")
+    assert (saved.grooms[0].guides.points == window.desk.document.grooms[0].guides.points).all()
+    assert load_settings().settings.recent == (str(tmp_path / "mine.filo"),)
+
+
+def test_closing_keeps_unsaved_work_for_the_next_start(opened: Opened, animal: Document) -> None:
+    hand = opened(animal)
+    hand.drag(BACK, ASIDE)
+    document = hand.window.desk.document
+    hand.window.close()
+    states = [recover(state_folder(), token) for token in abandoned(state_folder())]
+    assert any(
+        state is not None and (state.document.grooms[0].guides.points == document.grooms[0].guides.points).all()
+        for state in states)
+
+
+@pytest.mark.parametrize("name", [n for n in PANELS if n != "maps"])
+def test_panels_are_shown_and_hidden(name: str, opened: Opened) -> None:
+    window = opened().window
+    panel = window.panels[name]
+    assert panel.isVisible()
+    window.commands.run(f"window.{name}")
+    assert not panel.isVisible()
+    window.commands.run("window.reset_layout")
+    assert panel.isVisible()
+
+
+def test_theme_text_and_keymap_change_at_once_and_are_kept(opened: Opened) -> None:
+    window = opened().window
+    try:
+        window.commands.run("window.theme")
+        window.commands.run("window.text_larger")
+        window.change_settings(keymap="maya")
+        assert look_of().theme.name.lower() == "light"
+        assert look_of().text == 13
+        assert window.hotkeys.keymap.name == "Maya"
+        kept = load_settings().settings
+        assert (kept.theme, kept.text_size, kept.keymap) == ("light", 13, "maya")
+    finally:
+        window.change_settings(theme="dark", text_size=12)
+
+
+def test_the_status_line_says_what_the_hand_does_now(hand: Hand) -> None:
+    status, commands = hand.window.status, hand.window.commands
+    assert hand.window.desk.session.tool.hint in status.words.text()
+    commands.run("tool.cut")
+    assert hand.window.desk.session.tool.hint in status.words.text()
+    hand.window.desk.said.emit("Something new.")
+    assert status.words.text() == "Something new."
+
+
+def test_the_palette_opens_by_its_key_over_the_view(hand: Hand) -> None:
+    hand.key(Qt.Key.Key_K, CTRL)
+    from app.window.palette import Palette
+
+    palettes = hand.window.findChildren(Palette)
+    assert [p for p in palettes if p.isVisible()]
+    for palette in palettes:
+        palette.close()
+
+
+def test_every_command_is_in_the_menu(opened: Opened) -> None:
+    window = opened().window
+    menu = window.top.menu()
+    shown = sum(len(part.menu().actions()) for part in menu.actions())
+    assert shown == len(window.commands)
+    menu.deleteLater()
+
+
+def test_playing_moves_the_frame_and_the_picture(hand: Hand) -> None:
+    desk, frames = hand.window.desk, hand.view.frames
+    desk.set_workspace(frame=float(desk.document.first_frame))
+    hand.window.commands.run("frame.play")
+    assert hand.window.playing
+    hand.until(lambda: desk.workspace.frame >= desk.document.first_frame + 3)
+    hand.until(lambda: hand.view.frames > frames + 2)
+    hand.window.commands.run("frame.play")
+    assert not hand.window.playing
+    hand.rest()
