@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -26,6 +27,17 @@ from tests.window.host import Host  # noqa: E402
 from tools.session import Session  # noqa: E402
 
 Opened = Callable[..., Hand]
+
+
+@pytest.fixture(autouse=True)
+def rings_collected_here() -> Iterator[None]:
+    """Rings with widgets in them are collected between tests, on this thread (see app/window/garbage.py)."""
+    gc.disable()
+    gc.freeze()  # what there is already need not be gone through again after every test
+    yield
+    gc.collect()
+    gc.unfreeze()
+    gc.enable()
 
 
 @pytest.fixture
