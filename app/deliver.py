@@ -20,7 +20,7 @@ from core.groom.flow import nose_vertex
 from core.groom.groom import Groom
 from core.groom.strands import GroomStrands
 from core.mesh.skin import Skin, skin_at_rest, skin_posed
-from core.pose.skinning import posed_points
+from core.posed import points_at
 
 if TYPE_CHECKING:
     from viewport.scene import Scene
@@ -74,7 +74,7 @@ def posed_document(document: Document, frame: float | None, evaluator: Evaluator
         if frame is None or item.rig is None:
             skins[item.id] = skin_at_rest(item.mesh, evaluator)
         else:
-            points = posed_points(item.mesh.points, item.rig, frame, evaluator.workers.ranges)
+            points = points_at(item.mesh, item.rig, item.correctives, frame, evaluator)
             skins[item.id] = skin_posed(item.mesh, points, evaluator)
     return skins
 

@@ -10,8 +10,10 @@ from core.evaluator import Evaluator
 from core.mesh.distance_field import DistanceField, build_distance_field
 from core.mesh.mesh import Mesh
 from core.mesh.skin import FIELD_CELLS, Skin, distance_field, skin_at_rest, skin_posed
+from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
 from core.pose.skinning import posed_points
+from core.pose.synthesis import evaluate_at, prepare
 from core.record import freeze
 
 
@@ -24,7 +26,8 @@ def skin_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> Skin
     """The skin of a mesh at a frame; at rest without a frame or without a clip."""
     if frame is None or not moves(item):
         return skin_at_rest(item.mesh, evaluator)
-    points = evaluator.get(points_at, item.mesh, item.rig, frame=float(frame), evaluator=evaluator)
+    points = evaluator.get(
+        points_at, item.mesh, item.rig, item.correctives, frame=float(frame), evaluator=evaluator)
     return evaluator.get(_skin, item.mesh, points, evaluator=evaluator)
 
 
@@ -36,9 +39,15 @@ def field_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> Dis
     return evaluator.get(_field, item.mesh, skin.points, evaluator=evaluator)
 
 
-def points_at(mesh: Mesh, rig: Rig, frame: float, evaluator: Evaluator) -> NDArray[np.float32]:
+def points_at(
+    mesh: Mesh, rig: Rig, correctives: Correctives | None, frame: float, evaluator: Evaluator
+) -> NDArray[np.float32]:
     """The vertices (V, 3) float32 at a frame, frozen; the very ones at rest where the pose moves nothing."""
-    points = posed_points(mesh.points, rig, frame, evaluator.workers.ranges)
+    if correctives is None:
+        points = posed_points(mesh.points, rig, frame, evaluator.workers.ranges)
+    else:
+        prepared = evaluator.get(prepare, correctives, rig)
+        points = evaluate_at(mesh.points, rig, prepared, frame, evaluator.workers.ranges)
     # a pose that moves nothing but by rounding is the rest itself, so that all that is known of it serves
     rounding = 1e-6 * skin_at_rest(mesh, evaluator).diagonal
     return mesh.points if float(np.abs(points - mesh.points).max(initial=0.0)) <= rounding else freeze(points)

@@ -10,6 +10,7 @@ from core.evaluator import Evaluator
 from core.mesh.mesh import Mesh
 from core.mesh.normals import mesh_normals
 from core.mesh.skin import Posed, skin_at_rest
+from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
 from core.posed import moves, points_at
 
@@ -17,8 +18,13 @@ from core.posed import moves, points_at
 class _Kept(NamedTuple):
     mesh: Mesh
     rig: Rig | None
+    correctives: Correctives | None
     posed: Posed
     bytes: int
+
+    def is_of(self, item: MeshObject) -> bool:
+        """True when nothing that makes the pose was edited."""
+        return self.mesh is item.mesh and self.rig is item.rig and self.correctives is item.correctives
 
 
 class PosedFrames:
@@ -44,19 +50,19 @@ class PosedFrames:
             return Posed(rest.points, rest.normals)
         key = item.id, float(frame)
         kept = self._kept.get(key)
-        if kept is not None and kept.mesh is item.mesh and kept.rig is item.rig:
+        if kept is not None and kept.is_of(item):
             self._kept.move_to_end(key)
             return kept.posed
         self._drop_older_than(item)
         assert item.rig is not None
-        points = points_at(item.mesh, item.rig, float(frame), self._evaluator)
+        points = points_at(item.mesh, item.rig, item.correctives, float(frame), self._evaluator)
         if points is item.mesh.points:
             posed = Posed(points, skin_at_rest(item.mesh, self._evaluator).normals)
             size = 0  # nothing of its own
         else:
             posed = Posed(points, mesh_normals(item.mesh, points))
             size = posed.points.nbytes + posed.normals.nbytes
-        self._kept[key] = _Kept(item.mesh, item.rig, posed, size)
+        self._kept[key] = _Kept(item.mesh, item.rig, item.correctives, posed, size)
         self._used += size
         while self._used > self._budget and len(self._kept) > 1:
             self._remove(next(iter(self._kept)))
@@ -70,7 +76,7 @@ class PosedFrames:
         frames = [
             {
                 frame for (mesh_id, frame), kept in self._kept.items()
-                if mesh_id == item.id and kept.mesh is item.mesh and kept.rig is item.rig
+                if mesh_id == item.id and kept.is_of(item)
             }
             for item in moving
         ]
@@ -79,7 +85,7 @@ class PosedFrames:
     def _drop_older_than(self, item: MeshObject) -> None:
         """Drop poses of this mesh as it was before it was edited."""
         for key, kept in list(self._kept.items()):
-            if key[0] == item.id and (kept.mesh is not item.mesh or kept.rig is not item.rig):
+            if key[0] == item.id and not kept.is_of(item):
                 self._remove(key)
 
     def _remove(self, key: tuple[int, float]) -> None:

@@ -12,13 +12,14 @@ from numba.core.types import boolean, float32, int32, int64, void
 from numpy.typing import NDArray
 
 from core.pose.blend_shapes import morphed, shape_weights
+from core.pose.clip import numbers_at
 from core.pose.corrective import plain_weights
 from core.pose.embedding import embed
 from core.pose.extraction import skin_affine, surface_rotations
-from core.pose.pose import Pose, local_of_pose
+from core.pose.pose import Pose, local_of_pose, pose_of_local
 from core.pose.pose_space import Correctives, Dof, PoseLayer
 from core.pose.rig import Rig, resting_numbers
-from core.pose.skinning import moved_number, skin_matrices_of, skinned
+from core.pose.skinning import local_at, moved_number, skin_matrices_of, skinned
 from core.pose.solve import Solved, solve, weights_at
 from core.transform import Array
 from core.workers import serial_ranges
@@ -143,6 +144,20 @@ def evaluate(
     """
     ready = prepare(correctives, rig) if prepared is None else prepared
     return deform(mesh_points, rig, ready, local_of_pose(rig.skeleton, pose), pose, ranges)
+
+
+def pose_at(rig: Rig, frame: float) -> Pose:
+    """The pose at `frame` of the clip that plays, rest without one."""
+    numbers = {} if rig.clip is None else numbers_at(rig.clip, frame)
+    return pose_of_local(rig.skeleton, local_at(rig, frame), numbers=numbers)
+
+
+def evaluate_at(
+    mesh_points: NDArray[np.float32], rig: Rig, prepared: tuple[Prepared, ...], frame: float,
+    ranges: Ranges = serial_ranges,
+) -> NDArray[np.float32]:
+    """As :func:`evaluate`, at a frame of the clip that plays, whose joints may be scaled as well."""
+    return deform(mesh_points, rig, prepared, local_at(rig, frame), pose_at(rig, frame), ranges)
 
 
 def deform(

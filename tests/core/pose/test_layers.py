@@ -7,9 +7,11 @@ import pytest
 
 from core.document import Document, MeshObject
 from core.errors import UserError
+from core.evaluator import Evaluator
 from core.formats.project import read_project, write_project
 from core.leaves import same_bits
 from core.mesh.mesh import Mesh
+from core.pose.clip import split_matrices
 from core.pose.controls import rotation_dof
 from core.pose.corrective import as_kind
 from core.pose.edit_layers import (
@@ -22,10 +24,13 @@ from core.pose.edit_layers import (
     without_pose,
 )
 from core.pose.layers import Sculpt, build
-from core.pose.pose import Pose
+from core.pose.pose import Pose, local_of_pose
 from core.pose.pose_space import Correctives, PoseSpace
 from core.pose.refusal import Refusal
+from core.pose.rig import Control
+from core.pose.skeleton import Clip
 from core.pose.synthesis import evaluate, prepare
+from core.posed import skin_at
 from core.workers import Workers
 from core.workspace import Workspace
 from tests.core.pose.arms import arm, bumped, skinned_at, turned
@@ -239,6 +244,43 @@ def test_a_document_keeps_them(tmp_path):
     beyond = found.layers[0].replace(vertices=found.layers[0].vertices + np.int32(100))
     with pytest.raises(ValueError, match="correctives"):
         document.meshes[0].replace(correctives=Correctives(layers=(beyond,)))
+
+
+def test_a_clip_plays_with_its_correctives():
+    rig, points = arm(90)
+    made = sculpts(rig, points)
+    found = build(points, rig, made).correctives
+    locals_ = [local_of_pose(rig.skeleton, s.pose) for s in made[:6]]
+    parts = [split_matrices(m)[:3] for m in locals_]
+    columns = (np.array(c, np.float32) for c in zip(*parts))
+    clip = Clip(**dict(zip(("translations", "rotations", "scales"), columns)))
+    mesh = Mesh(points=points, counts=np.full(30, 3, np.int32), corners=np.arange(90, dtype=np.int32),
+                parts=np.zeros(30, np.int32), part_names=("arm",))
+    item = MeshObject(id=1, name="arm", mesh=mesh, rig=rig.replace(clip=clip), correctives=found)
+    evaluator = Evaluator()
+    for k, s in enumerate(made[:6]):
+        assert np.abs(skin_at(item, 1001.0 + k, evaluator).points - s.target).max() <= 2e-6
+    bare = skin_at(item.replace(correctives=None), 1002.0, evaluator).points
+    assert np.abs(bare - made[1].target).max() > 0.01
+    evaluator.close()
+
+
+def test_a_control_that_is_a_piece_of_the_body_is_felt():
+    rig, points = arm()
+    switch = Control(name="switch", kind="joint", joint="hand", axis=(0.0, 1.0, 0.0), travel=0.3)
+    rig = rig.replace(controls=(*rig.controls, switch))
+    pose = turned("up", {"switch": 1.0})
+    target = points + np.float32(0.01)
+    found = build(points, rig, [Sculpt(pose.replace(numbers={"flex": 1.0}), target)]).correctives
+    space = found.layers[0].space
+    heard = space.replace(
+        dofs=(space.dofs[0].replace(control="switch"),),
+        samples=(space.samples[0].replace(pose=pose),))
+    felt_by = Correctives(layers=(found.layers[0].replace(space=heard),))
+    raised = Pose(translations={"hand": tuple(np.linalg.inv(rig.skeleton.bind[2, :3, :3]) @ [0.0, 0.3, 0.0])})
+    moved = evaluate(points, rig, felt_by, raised) - skinned_at(rig, points, raised)
+    assert np.allclose(moved, evaluate(points, rig, found, pose.replace(numbers={"flex": 1.0})) - points, atol=1e-3)
+    assert np.abs(moved).max() > 0.009
 
 
 def test_refused_records():
