@@ -15,9 +15,10 @@ from app.deliver import deliver, draw, draw_strands, exported_groom, posed_docum
 from core.document import Document, MeshObject, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.formats import curve_file, mesh_file, project, recovery
+from core.formats import curve_file, mesh_file, project, recovery, rig_file
 from core.formats import journal as journal_file
 from core.formats.curve_file import CurveFile
+from core.formats.rig_assembly import NoRig, RigFile
 from core.groom.grow import grow
 
 Say = Callable[[str], None]
@@ -32,7 +33,7 @@ def describe(path: Path) -> dict[str, Any]:
     curves = _curves(path)
     if curves is not None:
         return curve_file.curve_info(path)
-    return mesh_file.mesh_info(path)
+    return _describe_mesh(path)
 
 
 def troubles(path: Path) -> list[str]:
@@ -47,7 +48,9 @@ def troubles(path: Path) -> list[str]:
         curves = _curves(path)
         if curves is not None:
             return _curve_troubles(curves)
-        return [f"{kind.replace('_', ' ')}: {count}" for kind, count in mesh_file.mesh_info(path)["problems"].items()]
+        found = _describe_mesh(path)
+        rig = [str(found["rig_problem"])] if "rig_problem" in found else []
+        return rig + [f"{kind.replace('_', ' ')}: {count}" for kind, count in found["problems"].items()]
     except UserError as error:
         return [str(error)]
 
@@ -66,6 +69,9 @@ def convert(source: Path, target: Path, unit: str | None, up: str | None, say: S
             raise UserError("a coat without its animal cannot become a project; groom the mesh, then comb to this coat")
         curve_file.write_groom(target, curves.groom)
         return {"guides": _count(curves.groom.guides), "hairs": _count(curves.groom.children)}
+    if suffix in PROJECT and (rigged := _rig_document(source, unit, up, say)) is not None:
+        project.write_project(target, rigged)
+        return {"vertices": len(rigged.meshes[0].mesh.points), "faces": len(rigged.meshes[0].mesh.counts)}
     mesh = mesh_file.read_mesh(source, unit=unit, up=up, say=say)
     if suffix in PROJECT:
         project.write_project(target, Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),)))
@@ -88,8 +94,11 @@ def draw_file(
         if curves is not None:
             draw_strands(png, curves.groom, size, view)
             return
-        mesh = mesh_file.read_mesh(path, unit=unit, up=up, say=say)
-        document = Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),))
+        rigged = None if frame is None else _rig_document(path, unit, up, say)
+        if rigged is None:
+            mesh = mesh_file.read_mesh(path, unit=unit, up=up, say=say)
+            rigged = Document(meshes=(MeshObject(id=1, name=mesh.name, mesh=mesh.mesh),))
+        document = rigged
     skins = posed_document(document, frame, evaluator)
     now = document.first_frame if frame is None else frame
     children = {
@@ -97,6 +106,46 @@ def draw_file(
         for g in visible_grooms(document)
     }
     draw(png, document, children, evaluator, size, view, skins=skins)
+
+
+def _describe_mesh(path: Path) -> dict[str, Any]:
+    """What a mesh file holds, and its rig where it has one; a rig that cannot be used is a ``rig_problem``."""
+    if path.suffix.lower() not in rig_file.READ_SUFFIXES:
+        return mesh_file.mesh_info(path)
+    rig: RigFile | None = None
+    problem: dict[str, Any] = {}
+    try:
+        rig = rig_file.read_rig(path)
+    except NoRig:
+        pass
+    except UserError as error:
+        problem = {"rig_problem": str(error)}
+    if path.suffix.lower() in mesh_file.READ_SUFFIXES:
+        held = mesh_file.mesh_info(path)
+        return {**held, **problem} if rig is None else {**held, "kind": "rig", **rig_file.rig_info(rig)}
+    if rig is None:
+        raise UserError(str(problem.get("rig_problem", f"{path.name} holds nothing that moves")))
+    mesh = rig.mesh
+    return {
+        "kind": "rig", "format": path.suffix[1:].upper(), "name": rig.name,
+        "parts": 0 if mesh is None else len(mesh.part_names), "vertices": 0 if mesh is None else len(mesh.points),
+        "faces": 0 if mesh is None else len(mesh.counts), "problems": {}, **rig_file.rig_info(rig),
+    }
+
+
+def _rig_document(path: Path, unit: str | None, up: str | None, say: Say) -> Document | None:
+    """The document of a rig file; None when nothing in it moves, or what moves it cannot be used, which is said."""
+    if path.suffix.lower() not in rig_file.READ_SUFFIXES:
+        return None
+    try:
+        return rig_file.document_of(rig_file.read_rig(path, unit=unit, up=up, say=say))
+    except NoRig:
+        return None
+    except UserError as error:
+        if path.suffix.lower() not in mesh_file.READ_SUFFIXES:
+            raise
+        say(f"{error} The mesh is read without its rig.")
+        return None
 
 
 def _convert_document(document: Document, target: Path) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Rigs of glTF 2.0: skins of any number of influences, morph targets, animations. Nodes of skins become joints.
 
-A frame is a second times the frame rate at which the keys of an animation lie on whole frames (24 where there is none).
+A frame is a second times the frame rate at which the keys of the first animation lie on whole frames (24 where there is
+none); all clips of a file have that rate.
 """
 
 from __future__ import annotations
@@ -322,9 +323,11 @@ def _targets(
 def _clips(
     file: _File, tree: _Tree, aliases: int, shapes_of_node: dict[int, list[str]], notes: list[str]
 ) -> list[RawClip]:
-    made = []
+    made: list[RawClip] = []
     for number, animation in enumerate(file.gltf.animations):
-        clip = _clip(file, animation, tree, aliases, shapes_of_node, animation.name or f"clip{number + 1}", notes)
+        name = animation.name or f"clip{number + 1}"
+        rate = made[0].frames_per_second if made else None
+        clip = _clip(file, animation, tree, aliases, shapes_of_node, name, rate, notes)
         if clip is not None:
             made.append(clip)
     return made
@@ -332,7 +335,7 @@ def _clips(
 
 def _clip(
     file: _File, animation: Animation, tree: _Tree, aliases: int, shapes_of_node: dict[int, list[str]], name: str,
-    notes: list[str],
+    wanted: float | None, notes: list[str],
 ) -> RawClip | None:
     channels = []
     for channel in animation.channels:
@@ -352,7 +355,7 @@ def _clip(
     if not channels:
         return None
     keys = np.concatenate([seconds for *_, seconds in channels])
-    rate = rate_of(keys)
+    rate = rate_of(keys) if wanted is None else wanted
     first, last = np.floor(keys.min() * rate + 1e-3), np.ceil(keys.max() * rate - 1e-3)
     if max(abs(first), abs(last)) > 1e9:
         raise UserError(f"{file.path.name} has a clip {name} that lasts too long; export a part of it.")

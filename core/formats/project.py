@@ -24,6 +24,7 @@ from core.formats.arrays import ArrayHashes, ArraySpec, array_from, raw_bytes, s
 from core.formats.atomic import atomic_write
 from core.formats.tree import LARGEST_TREE, MOST_ARRAYS, Encoded, Envelope, decode_envelope, decode_part, encode_tree
 from core.groom.groom import Coat
+from core.pose.rig import control_names
 from core.value import Constant
 from core.workspace import Workspace
 
@@ -125,6 +126,7 @@ def project_info(path: str | os.PathLike[str]) -> dict[str, Any]:
         "parts": [item.name for item in document.meshes],
         "vertices": sum(len(item.mesh.points) for item in document.meshes),
         "faces": sum(len(item.mesh.counts) for item in document.meshes),
+        "controls": [name for item in document.meshes if item.rig is not None for name in control_names(item.rig)],
         "grooms": [groom.name for groom in document.grooms],
         "guides": sum(len(groom.guides) for groom in document.grooms),
         "hairs": sum(_hairs(groom.coat) for groom in document.grooms),

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from core.document import Document, MeshObject
 from core.errors import UserError
 from core.formats import bvh, gltf_rig, tgf
 from core.formats.file_space import axis_of, metres_of
 from core.formats.rig_assembly import RigFile, assemble
 from core.formats.rig_parts import RawRig, unpack_rig
 from core.formats.sandbox import run_bounded
+from core.pose.rig import control_names
 
 Say = Callable[[str], None]
 SECONDS, MEMORY = 120.0, 8 << 30  # limits of a native reader
@@ -22,7 +25,6 @@ DAMAGE = (ValueError, IndexError, KeyError, OverflowError, RecursionError, np.li
 NATIVE = {
     ".usd": "core.formats.usd_rig:read_in_child", ".usda": "core.formats.usd_rig:read_in_child",
     ".usdc": "core.formats.usd_rig:read_in_child", ".usdz": "core.formats.usd_rig:read_in_child",
-    ".fbx": "core.formats.fbx:read_in_child",
 }  # fmt: skip
 READERS: dict[str, Callable[[Path], RawRig]] = {
     ".glb": gltf_rig.read_raw, ".gltf": gltf_rig.read_raw, ".bvh": bvh.read_raw, ".tgf": tgf.read_raw,
@@ -72,7 +74,44 @@ def read_rig(
     return found
 
 
+def document_of(found: RigFile) -> Document:
+    """A document of one rig; its timeline is that of the clip that plays.
+
+    Raises
+    ------
+    UserError
+        When the file has no mesh.
+    """
+    if found.mesh is None:
+        raise UserError(f"{found.name} has a skeleton but no mesh; open the rig that it moves.")
+    item = MeshObject(id=1, name=found.name, mesh=found.mesh, rig=found.rig)
+    clip = found.rig.clip
+    if clip is None:
+        return Document(meshes=(item,))
+    first, last = int(np.floor(clip.start)), int(np.ceil(clip.end))
+    return Document(meshes=(item,), fps=clip.frames_per_second, first_frame=first, last_frame=last)
+
+
+def rig_info(found: RigFile) -> dict[str, Any]:
+    """What a rig has, as plain JSON values: `controls` are joints and abstract controls by name."""
+    rig = found.rig
+    return {
+        "controls": list(control_names(rig)),
+        "joints": len(rig.skeleton.names),
+        "shapes": 0 if rig.shapes is None else len(rig.shapes.names),
+        "influences": rig.skin.joints.shape[1],
+        "skinning": rig.skinning,
+        "clips": [
+            {"name": clip.name, "start": clip.start, "end": clip.end, "frames_per_second": clip.frames_per_second}
+            for clip in found.clips
+        ],
+        "notes": list(found.notes),
+    }
+
+
 def _must_be_readable(path: Path) -> None:
+    if path.suffix.lower() == ".fbx":
+        raise UserError(f"{path.name} is an FBX file, which is not read; export the rig as USD or glTF.")
     if path.suffix.lower() not in READ_SUFFIXES:
         raise UserError(f"{path.name} is no rig format that is known; use {', '.join(READ_SUFFIXES)}.")
     try:
@@ -94,7 +133,7 @@ def _read(path: Path, sandboxed: bool, cancel: Callable[[], bool] | None) -> Raw
     if suffix in READERS:
         return READERS[suffix](path)
     where = {"path": str(path.resolve())}
-    if not sandboxed and suffix != ".fbx":
+    if not sandboxed:
         from core.formats import usd_rig
 
         return unpack_rig(usd_rig.read_in_child(**where))
