@@ -109,6 +109,15 @@ class LivePicture:
             self._refining, self._finished = None, True
         return not self._finished
 
+    def frame_at(self, frame: float, camera: Camera, size: tuple[int, int]) -> Iterator[float]:
+        """Make the finished picture of another frame and size in the view, slice by slice, without marks and words."""
+        session = self.session
+        options = shown_options(session).replace(hud=False, axes=False)
+        change = self.live.update(session.document, frame, options, True, None, session.workspace.groom)
+        self._size, self._options = size, options
+        self._take(change, camera)
+        yield from self.view.refine()
+
     def release(self) -> None:
         """Give everything on the graphics card back."""
         self.view.release()

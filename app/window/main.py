@@ -32,9 +32,11 @@ from app.window.file_actions import FileActions
 from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
+from app.window.maps_panel import MapsPanel
 from app.window.opening import Opening
 from app.window.outliner import Outliner
 from app.window.palette import Palette
+from app.window.playblast import PlayblastDialog
 from app.window.preferences import Preferences
 from app.window.recovery_bar import RecoveryBar
 from app.window.screenshot import Photographer
@@ -120,6 +122,7 @@ class MainWindow(QMainWindow):
             ("tool", ToolPanel(self.desk, memory)),
             ("respect", RespectPanel(self.desk, memory)),
             ("coat", CoatPanel(self.desk, memory)),
+            ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),
             ("history", Section(PANELS["history"][0], HistoryPanel(self.desk), memory, "history")),
         )
         for name, panel in made:
@@ -205,6 +208,12 @@ class MainWindow(QMainWindow):
             self.opening.ask()
         else:
             self.opening.open(path)
+
+    def make_playblast(self) -> None:
+        """Ask for a playblast beside the work."""
+        dialog = PlayblastDialog(self.desk, self.viewport.draw_frame, self.viewport.pixels(), self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.show()
 
     def look(self, camera: Camera) -> None:
         """Look through a camera."""
@@ -357,6 +366,8 @@ class MainWindow(QMainWindow):
 
     def _show_middle(self) -> None:
         self.middle.setCurrentWidget(self.view if self.desk.document.meshes else self.doors)
+        # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
+        self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
         self.status.show_hint()
 
     def show_saved(self) -> None:

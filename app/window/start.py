@@ -6,6 +6,7 @@ how far that is, and already takes what is to be opened.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -200,7 +201,21 @@ def open_window(wish: Wish, loaded: LoadedSettings) -> MainWindow:
         window.opening.open_demo()
     if wish.screenshot is None:
         window.offer_lost_work()
+    _collect_here(window)
     return window
+
+
+def _collect_here(window: MainWindow) -> None:
+    """Rings of Python objects may hold widgets, which only this thread may let go of: collect them here alone.
+
+    Jobs on other threads would collect them there, of which Qt dies. What the start has made is left out, so that a
+    collection takes a few milliseconds.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    window.viewport.settled.connect(gc.collect)
+    window.desk.session_replaced.connect(gc.collect)
 
 
 def _plugin_folders(loaded: LoadedSettings) -> tuple[Path, ...] | None:

@@ -151,9 +151,6 @@ VIEW: tuple[Command, ...] = (
         lambda w: w.toggle_projection(), "core.navigate.with_projection", scope="viewport", icon="perspective",
         words="ortho parallel lens",
         checked=lambda desk: bool(desk.session.workspace.cameras) and desk.session.workspace.cameras[0].orthographic),
-    Command(
-        "view.camera_from_file", "Camera from file…", "Looks through a shot's camera read from a USD or Alembic file.",
-        lambda w: w.camera_from_file(), "core.camera.Camera", icon="camera", words="shot import lens layout usd"),
     *(
         Command(
             f"view.store_{n}", f"Keep view {n}", f"Keeps how you look now as view {n}, saved with the project.",

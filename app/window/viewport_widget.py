@@ -8,7 +8,7 @@ number 0, whose size moderngl does not know: sizes are those of the window times
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import moderngl
 import numpy as np
@@ -81,6 +81,7 @@ class Viewport(QOpenGLWindow):
         self._screen: moderngl.Framebuffer | None = None
         self._stale = True
         self._wants_paint = True
+        self._lent = 0  # to who draws frames with it
         self._moved = False  # the picture being painted was drawn anew
         self._pointer: Pointer | None = None
         self._pen = False  # the pen is down: what the system makes of it as a mouse is no event of its own
@@ -123,6 +124,30 @@ class Viewport(QOpenGLWindow):
         """True when the picture is finished and nothing more will change it."""
         picture = self.picture
         return picture is not None and picture.settled and not self.pending and not self._rest.isActive()
+
+    def draw_frame(self, frame: float, size: tuple[int, int]) -> Iterator[object]:
+        """Draw a finished frame at a size in short slices; the last item is (height, width, 3) uint8 sRGB.
+
+        The picture on the screen stands still meanwhile.
+        """
+        picture, ctx = self.picture, self._ctx
+        if picture is None or ctx is None:
+            raise UserError("Nothing can be drawn without OpenGL 3.3.")
+        self._lent += 1
+        try:
+            for slice_of in picture.frame_at(frame, self.eye.camera, size):
+                yield slice_of
+                self.makeCurrent()
+            texture = ctx.texture(size, 4)
+            target = ctx.framebuffer([texture])
+            picture.view.present(target, size)
+            pixels = np.frombuffer(target.read(components=3, alignment=1), np.uint8).reshape(size[1], size[0], 3)
+            target.release()
+            texture.release()
+            yield np.ascontiguousarray(pixels[::-1])
+        finally:
+            self._lent -= 1
+            self.redraw()
 
     def scale_density(self, factor: float) -> None:
         """Draw so many times as many hairs while the hand moves."""
@@ -170,7 +195,7 @@ class Viewport(QOpenGLWindow):
     def paintGL(self) -> None:
         """One picture: drawn anew when something changed, else the one there is with the ring over it."""
         self._wants_paint = False
-        if self.picture is None or self._screen is None:
+        if self.picture is None or self._screen is None or self._lent:
             return
         picture, drawing = self.picture, self._stale
         self._moved = False
@@ -204,7 +229,7 @@ class Viewport(QOpenGLWindow):
     def _rest_a_little(self) -> None:
         """One slice of finishing; the next comes after whatever events there are."""
         picture = self.picture
-        if picture is None or self._busy() or self._stale or not self.isExposed():
+        if picture is None or self._lent or self._busy() or self._stale or not self.isExposed():
             return
         self.makeCurrent()
         more = picture.rest(self.eye.camera)

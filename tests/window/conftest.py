@@ -14,6 +14,7 @@ from tests.display import ensure_display
 OFFSCREEN = ensure_display()  # before anything of Qt is made
 
 from pytestqt.qtbot import QtBot  # noqa: E402
+from shiboken6 import isValid  # noqa: E402
 
 from app.window.main import MainWindow, fresh_workspace  # noqa: E402
 from app.window.settings import Settings  # noqa: E402
@@ -92,7 +93,8 @@ def opened(qtbot: QtBot, home: Path) -> Iterator[Opened]:
 
     yield open_one
     for window in windows:
-        window.close()
+        if isValid(window):  # a test may have closed it
+            window.close()
         qtbot.wait(1)
 
 

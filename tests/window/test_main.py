@@ -63,7 +63,7 @@ def test_closing_keeps_unsaved_work_for_the_next_start(opened: Opened, animal: D
         for state in states)
 
 
-@pytest.mark.parametrize("name", [n for n in PANELS if n != "maps"])
+@pytest.mark.parametrize("name", list(PANELS))
 def test_panels_are_shown_and_hidden(name: str, opened: Opened) -> None:
     window = opened().window
     panel = window.panels[name]
@@ -126,3 +126,18 @@ def test_playing_moves_the_frame_and_the_picture(hand: Hand) -> None:
     hand.window.commands.run("frame.play")
     assert not hand.window.playing
     hand.rest()
+
+
+def test_a_playblast_draws_finished_frames_and_gives_the_view_back(hand: Hand) -> None:
+    first = hand.window.desk.document.first_frame
+    pictures = []
+    for frame in (first, first + 12):
+        *_, pixels = hand.view.draw_frame(float(frame), (200, 120))
+        pictures.append(pixels)
+    assert pictures[0].shape == (120, 200, 3)
+    assert pictures[0].std() > 10.0
+    assert (pictures[0] != pictures[1]).any()
+    hand.rest()
+    assert hand.window.desk.workspace.frame != first + 12
+    hand.drag(BACK, ASIDE)
+    assert hand.window.desk.session.history.undo_name == "Comb"
