@@ -32,7 +32,7 @@ check: .venv/ready ## ruff, mypy (strict on core and tools), import contracts
 bench: .venv/ready ## the table of measured figures (FILOPLUME_PEERS=python with bpy adds Blender)
 	@NUMBA_NUM_THREADS=1 $(PY) -m app bench
 
-soak: .venv/ready ## the long ones: 10,000 kills, a million expressions
+soak: .venv/ready ## the long ones: 10,000 kills, a million expressions, 5,000 gestures
 	@$(PY) -m pytest tests/soak -p no:cacheprovider -o addopts= -q --timeout=7200
 
 pictures: .venv/ready ## remake the pictures of the manual in docs/
