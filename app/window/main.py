@@ -368,6 +368,8 @@ class MainWindow(QMainWindow):
         self.middle.setCurrentWidget(self.view if self.desk.document.meshes else self.doors)
         # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
         self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
+        # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
+        self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
         self.status.show_hint()
 
     def show_saved(self) -> None:
