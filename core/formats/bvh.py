@@ -60,8 +60,9 @@ def read_raw(path: Path) -> RawRig:
             if channel.endswith("position"):
                 moved[:, j, axis] = rows[:, column]
             else:
-                turn = quaternion_about(np.eye(3)[axis], np.radians(rows[:, column]))
-                turned[:, j] = quaternion_product(turned[:, j], turn)
+                with np.errstate(all="ignore"):  # what is not finite is found by the checks
+                    turn = quaternion_about(np.eye(3)[axis], np.radians(rows[:, column]))
+                    turned[:, j] = quaternion_product(turned[:, j], turn)
             column += 1
     clip = RawClip(
         path.stem or "clip", FIRST_FRAME, rate, moved, turned, np.ones_like(moved), (), np.zeros((len(rows), 0)),

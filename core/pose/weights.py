@@ -122,10 +122,10 @@ def smoothed(
             held = table.copy()
             free = 1.0 - held[:, [k for k in keep if k < joints and k != joint]].sum(axis=1)
             held[:, joint] = np.clip(moved[:, joint], 0.0, np.maximum(free, 0.0))
-            return held if joint in keep else _filled(held, np.append(keep, joint))
+            return held if joint in keep else _filled(held, np.append(keep, joint), mean)
         fixed = keep[keep < joints]
         moved[:, fixed] = table[:, fixed]
-        return _filled(moved, keep)
+        return _filled(moved, keep, table)
 
     return _changed(skin, np.flatnonzero(share > 0.0), joints, change)
 
@@ -166,7 +166,12 @@ def limited(skin: SkinWeights, influences: int, locked: ArrayLike = ()) -> SkinW
         held = keep[keep < rank.shape[1]]
         rank[:, held] += np.where(rank[:, held] > 0.0, 2.0, 0.0)
         weakest = np.argsort(-rank, axis=1, kind="stable")[:, influences:]
+        was = table.copy()
         np.put_along_axis(table, weakest, 0.0, axis=1)
+        free = np.setdiff1d(np.arange(table.shape[1]), keep)
+        lost = (table[:, free].sum(axis=1) <= TINY) & (was[:, free].sum(axis=1) > TINY)
+        if lost.any():
+            raise UserError("More joints are locked than a vertex may keep; unlock some, or allow more joints.")
         return _filled(table, keep)
 
     changed = _changed(skin, over, _joints(skin), change)
@@ -174,14 +179,15 @@ def limited(skin: SkinWeights, influences: int, locked: ArrayLike = ()) -> SkinW
 
 
 def pruned(skin: SkinWeights, least: float, locked: ArrayLike = ()) -> SkinWeights:
-    """Without weights below `least`; the strongest of a vertex and locked ones stay."""
+    """Without weights below `least`; the strongest of the free joints of a vertex and locked ones stay."""
     small = (skin.weights > 0.0) & (skin.weights < least) & ~np.isin(skin.joints, np.asarray(locked, np.int64))
     keep = np.unique(np.asarray(locked, np.int64))
 
     def change(rows: NDArray[np.int64], table: NDArray[np.float64]) -> NDArray[np.float64]:
-        gone = table < least
-        gone[:, keep[keep < table.shape[1]]] = False
-        gone[np.arange(len(table)), table.argmax(axis=1)] = False
+        free = table.copy()
+        free[:, keep[keep < table.shape[1]]] = -1.0
+        gone = (table < least) & (free >= 0.0)
+        gone[np.arange(len(table)), free.argmax(axis=1)] = False
         table[gone] = 0.0
         return _filled(table, keep)
 
@@ -237,15 +243,24 @@ def _padded(rows: NDArray, columns: int) -> NDArray:
     return out.astype(np.float64 if rows.dtype.kind == "f" else np.int64)
 
 
-def _filled(table: NDArray[np.float64], held: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Rows brought to a sum of 1 by the joints that are not `held`; by the held ones where there are no others."""
+def _filled(
+    table: NDArray[np.float64], held: NDArray[np.int64], instead: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Rows brought to a sum of 1 by the joints that are not `held`.
+
+    Where those have no weight they take that of the table `instead`; where they have none there either, the last of the
+    held joints takes what is missing.
+    """
     is_held = np.zeros(table.shape[1], np.bool_)
     is_held[held[held < table.shape[1]]] = True
     fixed = table[:, is_held].sum(axis=1)
     free = table[:, ~is_held].sum(axis=1)
+    if instead is not None:
+        bare = free <= TINY
+        table[np.ix_(bare, ~is_held)] = instead[np.ix_(bare, ~is_held)]
+        free = table[:, ~is_held].sum(axis=1)
     factor = np.where(free > TINY, np.maximum(1.0 - fixed, 0.0) / np.maximum(free, TINY), 0.0)
     table[:, ~is_held] *= factor[:, None]
-    # nobody is left to make room: the joint that was touched last takes it, or the held ones share it
     missing = 1.0 - table.sum(axis=1)
     alone = np.abs(missing) > TINY
     if alone.any() and len(held):
