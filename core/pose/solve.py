@@ -19,7 +19,8 @@ from core.pose.pose_space import Dof, PoseSpace
 from core.pose.refusal import Refusal
 from core.transform import Array
 
-LEAST_CONDITION = 1e-12  # reciprocal condition below which a system counts as singular
+LEAST_CONDITION = 1e-12  # smallest over largest singular value below which a system counts as singular
+DOUBTFUL = 1e-10  # the same by a quick lower bound, above which nobody looks closer
 TOO_CLOSE = 1e-6  # falloffs between two poses that are one pose by mistake
 MOST_LOSS = 1e-6  # by which rounding may miss a weight at its own pose
 
@@ -50,7 +51,7 @@ class Solved(NamedTuple):
     centres, scales : (C, D) where they lie before falloffs, and one over the falloffs of each.
     inverse : (C + q, C), from kernel and affine columns to weights; None for Shepard, who solves nothing.
     plane : the affine part, or None.
-    reciprocal_condition : smallest over largest singular value.
+    reciprocal_condition : smallest over largest singular value; above 1e-10 a lower bound of it.
     loss : (C,) by how much the weights at each centre miss 1 for itself and 0 for the others.
     """
 
@@ -113,13 +114,13 @@ def solve_centres(
     system = _system(matrix, centres, plane, settings.smoothing)
     if not symmetric:
         _refuse_turned(matrix, system, centres, usual, phi, plane, settings, names)
-    inverse, least, weakest = _inverse(system, names)
+    inverse, least = _inverse(system, names)
     if symmetric and settings.table and settings.kernel in POSITIVE and np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise Refusal("singular", names, "the table of the kernel is too coarse for them; give it more entries")
     inverse = inverse[:, :count]
     loss = np.abs(_columns(centres, centres, each, phi, plane) @ inverse - np.eye(count)).max(axis=1, initial=0.0)
     if settings.smoothing == 0.0 and loss.max() > MOST_LOSS:
-        raise Refusal("singular", _guilty(weakest, names))
+        raise Refusal("singular", _guilty(_weakest(system, names)[1], names))
     return Solved(dofs, settings, names, silent, centres, each, inverse, plane, least, loss)
 
 
@@ -173,18 +174,34 @@ def _system(matrix: Array, centres: Array, plane: Plane | None, smoothing: float
     return system
 
 
-def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float, Array]:
-    """The inverse, the reciprocal condition, and how much of each pose is in the weakest direction, all from one
-    decomposition."""
-    left, sizes, right = np.linalg.svd(system)
-    right = right.T
-    largest = sizes.max()
-    least = float(sizes.min() / largest) if largest > 0.0 else 0.0
+def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float]:
+    """The inverse and a reciprocal condition; Refusal when that of the singular values is below the least.
+
+    The condition by sums of columns bounds it within the size of the system, so singular values, many times slower,
+    are only sought where the bound leaves a doubt.
+    """
+    try:
+        inverse = np.linalg.inv(system)
+        least = 1.0 / float(np.abs(system).sum(axis=0).max() * np.abs(inverse).sum(axis=0).max() * len(system))
+    except np.linalg.LinAlgError:
+        least = 0.0
+    if least > DOUBTFUL:
+        return np.asarray(inverse, np.float64), least
+    least, share = _weakest(system, names)
     if not least >= LEAST_CONDITION:
-        # all directions that are lost, not one of them: three poses in one place lose two
-        lost = right[: len(names), sizes < max(LEAST_CONDITION * largest, 2.0 * sizes.min())]
-        raise Refusal("singular", _guilty(np.linalg.norm(lost, axis=1), names))
-    return (right / sizes) @ left.T, least, np.abs(right[: len(names), -1])
+        raise Refusal("singular", _guilty(share, names))
+    return np.asarray(inverse, np.float64), least
+
+
+def _weakest(system: Array, names: tuple[str, ...]) -> tuple[float, Array]:
+    """Smallest over largest singular value, and how much of each pose is in the directions that are as good as lost.
+
+    All of them, not the last alone: three poses in one place lose two.
+    """
+    _, sizes, directions = np.linalg.svd(system)
+    lost = sizes <= max(LEAST_CONDITION * sizes[0], 2.0 * sizes[-1])
+    share = np.linalg.norm(directions[lost][:, : len(names)], axis=0)
+    return (float(sizes[-1] / sizes[0]) if sizes[0] > 0.0 else 0.0), share
 
 
 def _refuse_twins(squared: Array, names: tuple[str, ...]) -> None:

@@ -25,7 +25,7 @@ from core.transform import Array
 from core.workers import serial_ranges
 
 Ranges = Callable[..., None]
-BLOCK = 256  # rows added up at a time, so that the sum stays in the nearest cache
+BLOCK = 2048  # rows added up at a time: the sum stays in a near cache, and deltas are read in long stretches
 
 
 class Prepared(NamedTuple):
@@ -218,7 +218,8 @@ def add_deltas(
 ) -> None:
     """Add the weighted deltas (M, 3 n) of rows first .. last to `points`, or to `late` for runs `after` skinning."""
     total = np.empty(3 * BLOCK, np.float32)
-    active = np.empty(weights.shape[1], np.int64)
+    used = np.zeros(weights.shape[1] + 7, np.int64)
+    share = np.zeros(weights.shape[1] + 7, np.float32)
     for g in range(len(starts) - 1):
         low, high = max(starts[g], first), min(starts[g + 1], last)
         if low >= high:
@@ -226,28 +227,26 @@ def add_deltas(
         count = 0
         for m in range(weights.shape[1]):
             if weights[g, m] != 0.0:
-                active[count] = m
+                used[count], share[count] = m, weights[g, m]
                 count += 1
+        while count % 8 != 0:  # eight samples at a time, the last filled up with nothing
+            used[count], share[count] = used[0], 0.0
+            count += 1
         for row in range(low, high, BLOCK):
             rows = min(BLOCK, high - row)
             base, size = 3 * row, 3 * rows
             for i in range(size):
                 total[i] = 0.0
-            k = 0
-            while k + 4 <= count:  # four at a time: the sum is read and written a quarter as often
-                w0, w1 = weights[g, active[k]], weights[g, active[k + 1]]
-                w2, w3 = weights[g, active[k + 2]], weights[g, active[k + 3]]
-                d0, d1 = deltas[active[k], base : base + size], deltas[active[k + 1], base : base + size]
-                d2, d3 = deltas[active[k + 2], base : base + size], deltas[active[k + 3], base : base + size]
+            for k in range(0, count, 8):
+                w0, w1, w2, w3 = share[k], share[k + 1], share[k + 2], share[k + 3]
+                w4, w5, w6, w7 = share[k + 4], share[k + 5], share[k + 6], share[k + 7]
+                d0, d1 = deltas[used[k], base : base + size], deltas[used[k + 1], base : base + size]
+                d2, d3 = deltas[used[k + 2], base : base + size], deltas[used[k + 3], base : base + size]
+                d4, d5 = deltas[used[k + 4], base : base + size], deltas[used[k + 5], base : base + size]
+                d6, d7 = deltas[used[k + 6], base : base + size], deltas[used[k + 7], base : base + size]
                 for i in range(size):
-                    total[i] += (w0 * d0[i] + w1 * d1[i]) + (w2 * d2[i] + w3 * d3[i])
-                k += 4
-            while k < count:
-                w0 = weights[g, active[k]]
-                d0 = deltas[active[k], base : base + size]
-                for i in range(size):
-                    total[i] += w0 * d0[i]
-                k += 1
+                    total[i] += ((w0 * d0[i] + w1 * d1[i]) + (w2 * d2[i] + w3 * d3[i])) + (
+                        (w4 * d4[i] + w5 * d5[i]) + (w6 * d6[i] + w7 * d7[i]))
             target = late if after[g] else points
             for r in range(rows):
                 p = places[row + r]
