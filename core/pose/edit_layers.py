@@ -99,7 +99,8 @@ def add_sculpt(
     below = [s.pose for lower in layers[:at] for s in lower.space.samples]
     space = layer.space.replace(anchors=anchors_of(layer.space, below))
     layers[at], report = extract_layer(
-        points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer)
+        points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer,
+        (len(space.samples) - 1,))
     rest = refresh(points, rig, Correctives(layers=tuple(layers)), at + 1, kept)
     return Extracted(rest.correctives, (report, *rest.reports))
 

@@ -6,7 +6,7 @@ are anchors above, where a layer is silent: so every sculpt is met exactly, what
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +39,8 @@ class Sculpt(NamedTuple):
 class LayerReport(NamedTuple):
     """How a layer could be extracted.
 
-    condition : (M, n) float32 of the skin at each vertex of the layer at each pose; 0 where it was not sculpted.
+    condition : (M, n) float32 of the skin at each vertex of the layer at each pose; 0 where it was not sculpted, or
+        not extracted anew.
     flagged : (n,) the vertices that are corrected after skinning, for one of these is too large.
     """
 
@@ -133,7 +134,7 @@ def anchors_of(space: PoseSpace, below: Sequence[Pose]) -> tuple[Pose, ...]:
 def extract_layer(
     points: NDArray[np.float32], rig: Rig, below: Sequence[Prepared], name: str, space: PoseSpace,
     vertices: NDArray[np.int32], targets: NDArray[Any], moved: NDArray[np.bool_] | None = None,
-    like: PoseLayer | None = None,
+    like: PoseLayer | None = None, fresh: Collection[int] | None = None,
 ) -> tuple[PoseLayer, LayerReport]:
     """The corrections of a space as deltas from the layers below.
 
@@ -142,6 +143,8 @@ def extract_layer(
     vertices, targets : (n,) and (M, n, 3), the sculpted surfaces; NaN where a sculpt says nothing.
     moved : (M, n) what counts as sculpted in any case, or None.
     like : the layer whose kind and switch to keep.
+    fresh : the samples to extract; those of the others are kept from `like`, which has these very `vertices`. All
+        when None.
 
     Raises
     ------
@@ -151,30 +154,40 @@ def extract_layer(
     solve(space)
     least = UNMOVED * float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     poses, count = [s.pose for s in space.samples], len(space.samples)
-    states = [_state(points, rig, below, pose, vertices) for pose in poses]
+    new = [k for k in range(count) if fresh is None or k in fresh]
     given = np.isfinite(targets).all(axis=2)
-    missing = np.where(given[..., None], targets - np.array([s.posed for s in states]).reshape(targets.shape), 0.0)
-    sampled = np.linalg.norm(missing, axis=2) > least
-    if moved is not None:
-        sampled |= moved & given
+    sampled = np.zeros(given.shape, np.bool_) if moved is None else moved & given
+    surfaces = np.where(given[..., None], targets, 0.0).astype(np.float64)
+    states = {k: _state(points, rig, below, poses[k], vertices) for k in new}
+    for k, state in states.items():
+        surfaces[k, ~given[k]] = state.posed[~given[k]]
+        sampled[k] |= np.linalg.norm(surfaces[k] - state.posed, axis=1) > least
     rows = np.flatnonzero(sampled.any(axis=0))
-    vertices, missing, sampled = vertices[rows], missing[:, rows], sampled[:, rows]
-    surfaces = np.array([s.posed[rows] for s in states]).reshape(missing.shape) + missing
-    before, condition = np.zeros_like(missing), np.zeros(sampled.shape)
-    for k, state in enumerate(states):
+    vertices, sampled, surfaces = vertices[rows], sampled[:, rows], surfaces[:, rows]
+    kept = like if like is not None and len(new) < count else None
+    deltas = np.zeros(surfaces.shape, np.float32) if kept is None else kept.deltas[:, rows].copy()
+    was_after = np.zeros(len(rows), np.bool_) if kept is None else kept.after[rows]
+    condition = np.zeros(sampled.shape)
+    for k, state in states.items():
         mine = sampled[k]
         affine = skin_affine(rig, state.matrices, vertices[mine])
-        before[k, mine], condition[k, mine] = before_skinning(affine, missing[k, mine])
-    flagged: NDArray[np.bool_] = np.any(condition > MOST_CONDITION, axis=0)
-    deltas = before.astype(np.float32)
-    for k, state in enumerate(states):
-        mine = sampled[k] & flagged
-        affine = skin_affine(rig, state.matrices, vertices[mine])
-        deltas[k, mine] = after_skinning(affine, state.matrices, missing[k, mine])
+        missing = surfaces[k, mine] - state.posed[rows[mine]]
+        deltas[k, mine], condition[k, mine] = before_skinning(affine, missing)
+    flagged: NDArray[np.bool_] = was_after | np.any(condition > MOST_CONDITION, axis=0)
+    for k in range(count):
+        mine = sampled[k] & flagged & (True if k in states else ~was_after)
+        if mine.any():
+            state = _state(points, rig, below, poses[k], vertices[mine])
+            affine = skin_affine(rig, state.matrices, vertices[mine])
+            deltas[k, mine] = after_skinning(affine, state.matrices, surfaces[k, mine] - state.posed)
     shares = skin_shares(space.dofs, space.weighted, rig, vertices)
     known = sampled.copy()
     if like is None or like.kind == "pose-space":
         _hold(space, known, deltas, shares, least)
+    for k in range(count):
+        held = known[k] & ~sampled[k]
+        if k not in states and held.any():  # nobody sculpted them there: they stay where the layers below have them
+            surfaces[k, held] = _state(points, rig, below, poses[k], vertices[held]).posed
     keys = run_keys(flagged, known, shares)
     order = np.lexsort(keys[::-1]) if len(rows) else np.zeros(0, np.int64)
     layer = PoseLayer(
@@ -219,7 +232,7 @@ def _hold(
     poses may lie in a plane) all poses are taken.
     """
     places = embed(space.dofs, [s.pose for s in space.samples])
-    while True:
+    while not known.all():
         changed = False
         keys = run_keys(np.zeros(known.shape[1], np.bool_), known, shares)
         _, which = np.unique(keys, axis=1, return_inverse=True) if known.shape[1] else (None, np.zeros(0, np.int64))

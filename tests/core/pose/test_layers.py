@@ -167,6 +167,21 @@ def test_half_a_turn_of_twist_is_met_and_flagged():
         assert np.array_equal(report.flagged, (report.condition > 30).any(axis=0))
 
 
+def test_vertices_flagged_by_a_later_sculpt_keep_the_earlier_ones():
+    rig, points = arm()
+    axis = np.array(rotation_dof(rig.skeleton, "fore").axis)
+    half_turn = Pose(name="half a turn", rotations={"fore": (*(np.sin(np.radians(89)) * axis), np.cos(np.radians(89)))})
+    made = [Sculpt(p, bumped(rig, points, p, i, 0.4, 0.3)) for i, p in enumerate([*poses()[:2], half_turn])]
+    found = build(points, rig, made[:2]).correctives
+    assert not found.layers[0].after.any()
+    found = add_sculpt(points, rig, found, half_turn, made[2].target).correctives
+    assert found.layers[0].after.any()
+    assert not found.layers[0].after.all()
+    assert worst(rig, points, found, made) <= 1e-6
+    again = refresh(points, rig, found).correctives
+    assert worst(rig, points, again, made) <= 1e-6
+
+
 def test_deleting_merging_and_moving_mend_a_refusal():
     rig, points = arm(200)
     made = sculpts(rig, points)[:3]
