@@ -129,12 +129,13 @@ class PoseSpace(Record, kw_only=True):
         names = [s.name for s in self.samples]
         if len({*names, REST_NAME}) != len(names) + 1:
             raise ValueError("PoseSpace.samples must have names of their own, other than 'rest'")
-        kinds = {d.control: d.kind for d in self.dofs}
         for own in (self.rest_falloffs, *(s.falloffs for s in self.samples)):
             for control, falloff in own.items():
-                if control not in kinds:
+                if control not in self.controls:
                     raise ValueError(f"PoseSpace: a falloff is given for {control!r}, which the space does not read")
-                check_falloff(falloff, kinds[control], f"PoseSpace: the falloff of {control!r}")
+                for dof in self.dofs:
+                    if dof.control == control:
+                        check_falloff(falloff, dof.kind, f"PoseSpace: the falloff of {control!r}")
 
     @property
     def controls(self) -> tuple[str, ...]:

@@ -154,7 +154,7 @@ def _adding() -> list[Row]:
     have = build(points, rig, made[:-1]).correctives
     last = made[-1]
     whole = median_ms(lambda: add_sculpt(points, rig, have, last.pose, last.target), runs=3)
-    rows.append(Row("a sculpt added to 32 which all move the same 10,000 vertices, extracted and arranged", whole, "ms"))
+    rows.append(Row("a sculpt added to 32 that move the same 10,000 vertices, extracted and arranged", whole, "ms"))
     return rows
 
 
