@@ -112,18 +112,17 @@ def _bindings(stage: Any, notes: list[str]) -> tuple[dict[str, tuple[int, Any]],
             skels.append(_skel(cache, skeleton, sum(len(s.tokens) for s in skels), notes))
         return rows[path]
 
-    for prim in stage.Traverse(flag):
-        if not prim.IsA(UsdSkel.Root):
-            continue
-        root = UsdSkel.Root(prim)
+    roots = [UsdSkel.Root(prim) for prim in stage.Traverse(flag) if prim.IsA(UsdSkel.Root)]
+    for root in roots:
         cache.Populate(root, flag)
+    for prim in stage.Traverse(flag):  # in the order of the stage, those that carry no skin too
+        if prim.IsA(UsdSkel.Skeleton):
+            row_of(UsdSkel.Skeleton(prim))
+    for root in roots:
         for binding in cache.ComputeSkelBindings(root, flag):
             row = row_of(binding.GetSkeleton())
             for target in binding.GetSkinningTargets():
                 bound.setdefault(str(target.GetPrim().GetPath()), (row, target))
-    for prim in stage.Traverse(flag):  # skeletons that carry no skin
-        if prim.IsA(UsdSkel.Skeleton):
-            row_of(UsdSkel.Skeleton(prim))
     return bound, skels
 
 
@@ -158,10 +157,10 @@ def _skel(cache: Any, skeleton: Any, first: int, notes: list[str]) -> _Skel:
     elif rest is None:
         assert bind is not None
         rest = np.stack([np.linalg.solve(bind[p], bind[j]) if p >= 0 else bind[j] for j, p in enumerate(parents)])
-        notes.append(f"The skeleton {skeleton.GetName()} has no rest pose; the pose it was bound in is used.")
+        notes.append(f"The skeleton {skeleton.GetPrim().GetName()} has no rest pose; the pose it was bound in is used.")
     elif bind is None:
         bind = concatenated(rest, parents)
-        notes.append(f"The skeleton {skeleton.GetName()} has no bind pose; its rest pose is used.")
+        notes.append(f"The skeleton {skeleton.GetPrim().GetName()} has no bind pose; its rest pose is used.")
     assert rest is not None
     assert bind is not None
     imageable = UsdGeom.Imageable(skeleton.GetPrim())

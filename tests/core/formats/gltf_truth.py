@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 
-def gltf_points(path: Path, clip: int, seconds: float) -> np.ndarray:
-    """Points of all primitives by the letter of the glTF specification, one vertex after another; slow and plain."""
+def gltf_points(path: Path, clip: int | None, seconds: float) -> np.ndarray:
+    """Points (V, 3) of all primitives, one vertex after another; at rest without a clip."""
     data = path.read_bytes()
     if data[:4] == b"glTF":
         length = int.from_bytes(data[12:16], "little")
@@ -46,7 +46,7 @@ def gltf_points(path: Path, clip: int, seconds: float) -> np.ndarray:
         return out / np.iinfo(kind).max if a.get("normalized") else out
 
     nodes = [dict(n) for n in doc["nodes"]]
-    for channel in doc["animations"][clip]["channels"]:
+    for channel in doc["animations"][clip]["channels"] if clip is not None else ():
         sampler = doc["animations"][clip]["samplers"][channel["sampler"]]
         times, values = numbers(sampler["input"])[:, 0], numbers(sampler["output"]).reshape(-1)
         mode = sampler.get("interpolation", "LINEAR")

@@ -12,7 +12,7 @@ from core.errors import UserError
 from core.formats.rig_assembly import NoRig
 from core.formats.rig_file import read_rig
 from core.pose.rig import playing
-from core.pose.skinning import posed_points
+from core.pose.skinning import deformed, posed_points
 from tests.core.formats.gltf_truth import gltf_points
 
 KINDS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
@@ -159,6 +159,9 @@ def test_everything_at_once_is_as_the_specification_says(tmp_path):
     assert rig.controls[1].rest == 0.25
     assert [(c.name, c.start, c.end, c.frames_per_second) for c in found.clips] == [
         ("all", 0.0, 18.0, 24.0), ("clip2", 0.0, 18.0, 24.0)]
+    rest = in_file_order(rig, deformed(found.mesh.points, rig, rig.skeleton.rest))
+    truth = gltf_points(path, None, 0.0)
+    assert np.abs(rest - truth).max() <= 1e-5 * np.ptp(truth, axis=0).max()
     for number, clip in enumerate(found.clips):
         for frame in range(19):
             points = in_file_order(rig, posed_points(found.mesh.points, playing(rig, clip.name), frame))
@@ -238,7 +241,8 @@ def test_what_contradicts_itself_is_refused_in_a_sentence(tmp_path, changes, sai
 @pytest.mark.parametrize("changes", [
     {"animations": animation(input=lambda m: m.add(np.float32([1, 0])))},
     {"animations": animation(input=lambda m: m.add(np.float32([0, np.nan])))},
-    {"animations": [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}], "samplers": [{"input": 0, "output": 0}]}]},
+    {"animations": [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}],
+                     "samplers": [{"input": 0, "output": 0}]}]},
     {"skins": lambda s, m: [{"joints": [0, 1], "inverseBindMatrices": m.add(np.full((2, 16), np.nan, "f4"))}]},
     {"skins": lambda s, m: [{"joints": [0, 1, 1], "inverseBindMatrices": m.add(np.zeros((3, 16), "f4"))}]},
     {"animations": animation(output=lambda m: m.add(np.full((2, 3), np.inf, "f4")))},

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
 from core.pose.clip import local_matrices
-from core.pose.rig import Rig
+from core.pose.rig import Control, Rig, control_names, playing
 from core.pose.skeleton import Clip, Skeleton, SkinWeights
-from core.pose.skinning import object_matrices, posed_points, skin_matrices
+from core.pose.skinning import moved_number, object_matrices, posed_points, skin_matrices
 from core.transform import compose, transform_points
 from core.workers import Workers
 
@@ -120,3 +120,51 @@ def test_refusals():
     ):
         with pytest.raises(ValueError):
             wrong()
+
+
+def test_a_control_is_a_number_a_piece_of_geometry_or_a_joint():
+    rig, points = some_rig(joints=3, influences=1)
+    plain = np.tile(np.eye(4), (3, 1, 1))
+    skeleton = rig.skeleton.replace(parents=np.array([-1, 0, -1], np.int32), rest=plain, bind=plain)
+    joints = np.where(np.arange(len(points)) < 10, 2, 0).astype(np.int32)[:, None]
+    skin = SkinWeights(joints=joints, weights=np.ones((len(points), 1), np.float32))
+    dials = (
+        Control(name="happy", rest=0.25), Control(name="piece", kind="geometry", vertices=np.arange(10, dtype=np.int32),
+                                                  axis=(0, 2, 0), travel=0.5, low=-1, high=3),
+        Control(name="switch", kind="joint", joint="j2", axis=(1, 1, 0), rest=0.5),
+    )
+    rig = Rig(skeleton=skeleton, skin=skin, controls=dials)
+    local = plain.copy()
+    local[2, :3, 3] = [1, 1, 9]
+    local[0, :3, 3] = [5, 5, 5]  # the rest of the mesh moves, its piece does not
+    assert control_names(rig) == ("j0", "j1", "j2", "happy", "piece", "switch")
+    assert moved_number(dials[0], rig, points, local) == 0.25
+    assert moved_number(dials[0], rig, points, local, {"happy": 0.75}) == 0.75
+    assert moved_number(dials[1], rig, points, local) == pytest.approx(2.0, abs=1e-6)
+    assert moved_number(dials[2], rig, points, local) == pytest.approx(0.5 + np.sqrt(2.0))
+    for control in dials:
+        assert moved_number(control, rig, points, plain) == pytest.approx(control.rest, abs=1e-6)
+    for wrong in (
+        {"kind": "geometry"}, {"joint": "j0"}, {"kind": "joint", "joint": "j0", "axis": (0, 0, 0)}, {"travel": 0.0},
+        {"low": 2.0, "high": 1.0}, {"rest": 7.0}, {"kind": "geometry", "vertices": np.zeros(0, np.int32)},
+    ):
+        with pytest.raises(ValueError):
+            Control(name="x", **wrong)
+    for wrong in (Control(name="j1"), dials[0], Control(name="y", kind="joint", joint="gone"),
+                  Control(name="y", kind="geometry", vertices=np.int32([9999]))):
+        with pytest.raises(ValueError):
+            rig.replace(controls=(*dials, wrong))
+
+
+def test_several_clips_one_of_which_plays():
+    rig, points = some_rig()
+    rig = rig.replace(clips=(rig.clip.replace(name="run", translations=rig.clip.translations + np.float32(1)),))
+    run = playing(rig, "run")
+    assert (run.clip.name, run.clips[0].name) == ("run", "clip")
+    assert not np.allclose(posed_points(points, run, 1002), posed_points(points, rig, 1002))
+    assert playing(run, None).clip is None
+    assert {c.name for c in playing(run, None).clips} == {"run", "clip"}
+    with pytest.raises(UserError, match="choose one of clip, run"):
+        playing(rig, "gallop")
+    with pytest.raises(ValueError, match="names that differ"):
+        rig.replace(clips=(rig.clip,))
