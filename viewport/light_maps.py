@@ -11,24 +11,25 @@ from numpy.typing import NDArray
 
 from viewport.drawables.mesh import MeshDrawable
 from viewport.drawables.strands import CoatDrawable
-from viewport.scene import Scene, all_points, direction
+from viewport.outline import extent
+from viewport.scene import Scene, direction
 from viewport.strand_textures import points_by_axis
 
+LITTLE_TURN = float(np.cos(np.radians(4.0)))
 LAYERS = np.array([0.06, 0.16, 0.36, 0.8])  # ends of the layers as parts of a hair's length
 
 
-def light_frame(scene: Scene, toward: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Matrix light_from_world (4, 4) of a parallel light that sees the whole scene, and the box's size (3,), metres."""
+def light_frame(
+    outline: NDArray[np.float32], toward: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Matrix light_from_world (4, 4) of a parallel light that sees the whole scene, and the box's size (3,), metres.
+
+    outline : (M, 3), see :func:`viewport.outline.outline_points`.
+    """
     z = direction(toward)
     x = direction(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
     axes = np.stack([x, np.cross(z, x), z])
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for points in all_points(scene):
-        if len(points):
-            q = points @ axes.T
-            low, high = np.minimum(low, q.min(axis=0)), np.maximum(high, q.max(axis=0))
-    if not np.isfinite(low).all():
-        low, high = np.full(3, -0.5), np.full(3, 0.5)
+    low, high = extent((outline @ axes.T).astype(np.float32))
     size = high - low
     size = 1.04 * np.maximum(size, 1e-3 * max(float(size.max()), 1e-6))
     middle = 0.5 * (low + high)
@@ -36,6 +37,11 @@ def light_frame(scene: Scene, toward: NDArray[np.float64]) -> tuple[NDArray[np.f
     matrix[:3, :3] = axes * (np.array([2.0, 2.0, -2.0]) / size)[:, None]
     matrix[:3, 3] = -middle * np.array([2.0, 2.0, -2.0]) / size
     return matrix, size
+
+
+def alike(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    """True when maps of a light from direction `a` (3,) do for one from `b`, for a moving picture."""
+    return float(a @ b) > LITTLE_TURN
 
 
 def usual_length(scene: Scene) -> float:
@@ -75,14 +81,14 @@ class LightMaps:
 
     def draw(
         self, scene: Scene, toward: NDArray[np.float64], meshes: Sequence[MeshDrawable], coats: Sequence[CoatDrawable],
-        shares: Sequence[float] = (),
+        outline: NDArray[np.float32], shares: Sequence[float] = (),
     ) -> Generator[None, None, dict[str, Any]]:
         """Draw the maps in steps; returns the uniforms of lighting.glsl that describe them.
 
-        shares : of each coat, see :meth:`CoatDrawable.draw_opacity`; 1 when not given.
+        outline : of the scene, (M, 3). shares : of each coat, see :meth:`CoatDrawable.draw_opacity`; 1 when not given.
         """
         ctx = self.ctx
-        matrix, size = light_frame(scene, toward)
+        matrix, size = light_frame(outline, toward)
         # texels are square in metres only when the box is: the mean serves the opacity, which is a ratio of areas
         texel = float(np.sqrt(size[0] * size[1])) / self.side
         length = max(usual_length(scene), 1e-6 * float(size.max()))

@@ -14,7 +14,7 @@ from viewport.display_target import DisplayTarget, display_target
 from viewport.drawables.guides import GuideDrawable
 from viewport.drawables.strands import CoatDrawable
 from viewport.kept import matched, same
-from viewport.light_maps import LightMaps
+from viewport.light_maps import LightMaps, alike
 from viewport.near_side import (
     grown_box,
     near_guides,
@@ -50,10 +50,12 @@ class Moving:
         self._behind_key: tuple[Any, ...] | None = None
         self._across: dict[int, float] = {}
         self._hairs = 0
+        self._turning = False  # the last picture was of another camera
         self._camera: Camera | None = None
         self._base_key: tuple[Any, ...] | None = None
         self._sparse_key: tuple[Any, ...] | None = None
         self._light_key: tuple[Any, ...] | None = None
+        self._toward = np.zeros(3)  # the key light that the maps were drawn for
         self._lighting: dict[str, Any] = {}
         self._guides_key: tuple[Any, ...] | None = None
         self.patch = Patch(ctx, renderer.ribbons)
@@ -72,7 +74,9 @@ class Moving:
         camera = self._camera
         self._sparse = [(c, sparse_points(c, drawn) if c.points is points else drawn) for c, drawn in self._sparse]
         if camera is not None:
-            self._near = [(g, near_guides(g, camera) if g.points is points else near) for g, near in self._near]
+            self._near = [
+                (g, near_guides(g, camera, self._turning) if g.points is points else near) for g, near in self._near
+            ]
         self.touched.append((points, rows))
 
     def draw(
@@ -86,7 +90,7 @@ class Moving:
         finished : the light's maps of a finished picture in the same light, and the uniforms that describe them.
         picture : the finished picture and its number, when since then only rows were changed: it stays elsewhere.
         """
-        self._gather(scene, camera, size, hairs)
+        self._gather(scene, camera, size, hairs, picture is None)
         drawables: list[CoatDrawable | GuideDrawable] = [*self.coats, *self.guides]
         for drawable in drawables:
             _finish(drawable.upload())
@@ -171,15 +175,17 @@ class Moving:
         self._last_guides = list(scene.guides)
         return patch.target
 
-    def _gather(self, scene: Scene, camera: Camera, size: tuple[int, int], hairs: int) -> None:
+    def _gather(self, scene: Scene, camera: Camera, size: tuple[int, int], hairs: int, may_thin: bool) -> None:
         key = (*scene.coats, camera, size, hairs)
+        turning = may_thin and self._camera is not None and not same(self._camera, camera)
+        self._turning = turning
         if not same(self._sparse_key, key):
             self._sparse_key, self._camera, self._hairs = key, camera, hairs
             self._sparse = [(coat, sparse_coat(coat, camera, hairs, size)) for coat in scene.coats]
-        guides_key = (*scene.guides, camera)
+        guides_key = (*scene.guides, camera, turning)
         if not same(self._guides_key, guides_key):
             self._guides_key = guides_key
-            self._near = [(lines, near_guides(lines, camera)) for lines in scene.guides]
+            self._near = [(lines, near_guides(lines, camera, turning)) for lines in scene.guides]
         ctx, renderer = self.ctx, self.renderer
         self.coats = matched(
             self.coats, [drawn for _, drawn in self._sparse],
@@ -197,22 +203,23 @@ class Moving:
         }
 
     def _light(self, scene: Scene, toward: np.ndarray) -> dict[str, Any]:
-        key = (*scene.surfaces, self._sparse_key, tuple(toward.tolist()))
-        if not same(self._light_key, key):
+        """The maps of a light that has turned but little are those it had: redrawing them costs more than it shows."""
+        key = (*scene.surfaces, *scene.coats, self._hairs)
+        if not same(self._light_key, key) or not alike(self._toward, toward):
             shares = []
             for coat, drawn in self._sparse:
                 narrower = mean_width(coat.look) / max(mean_width(drawn.look), 1e-12)
                 shares.append(stands_for(coat, self._hairs) * narrower)
-            drawables = self.renderer.solids.meshes
-            self._lighting = _finish(self.light_maps.draw(scene, toward, drawables, self.coats, shares))
-            self._light_key = key
+            drawables, outline = self.renderer.solids.meshes, self.renderer.outline.of(scene)
+            self._lighting = _finish(self.light_maps.draw(scene, toward, drawables, self.coats, outline, shares))
+            self._light_key, self._toward = key, toward
         return self._lighting
 
     def _draw_base(
         self, scene: Scene, camera: Camera, size: tuple[int, int], options: ViewOptions, uniforms: dict[str, Any],
         maps: LightMaps,
     ) -> None:
-        lit = self._light_key if maps is self.light_maps else id(maps)
+        lit = (self._light_key, tuple(self._toward.tolist())) if maps is self.light_maps else id(maps)
         key = (
             *scene.surfaces, *(coat.look for coat in scene.coats), scene.background, scene.exposure, scene.lights,
             camera, size, options, self.renderer.backdrop.image, lit,
@@ -229,7 +236,8 @@ class Moving:
         self._draw_backdrop(scene, size)
         target.use()
         maps.bind()
-        self.renderer.solids.draw(scene, camera, target, {**uniforms, "tap_reach": 0}, options, quick=True)
+        outline = self.renderer.outline.of(scene)
+        self.renderer.solids.draw(scene, camera, target, {**uniforms, "tap_reach": 0}, outline, options, quick=True)
 
     def _draw_backdrop(self, scene: Scene, size: tuple[int, int]) -> None:
         """Copy the background, which does not turn with the camera, into the base."""

@@ -9,6 +9,7 @@ from core.camera import Camera, pixel_scale, project
 from viewport.scene import Coat, GuideLines
 
 AWAY = -0.35  # cosine between skin and the way to the eye below which hair is hidden by what it grows on
+TURNING_POINTS, MOST_TURNING = 5, 700  # of a guide, and guides of a groom, while the camera moves
 FEWEST_POINTS, MOST_POINTS = 4, 8  # of a hair while the hand moves
 BOX_MARGIN = 24.0  # pixels around what moved
 MOST_COVER = 0.7  # of the picture, all hairs side by side: what filling them may cost
@@ -104,12 +105,18 @@ def fewer_points(points: np.ndarray, rows: NDArray[np.integer], count: int) -> N
     return np.ascontiguousarray(gathered, np.float32)
 
 
-def near_guides(lines: GuideLines, camera: Camera) -> GuideLines:
-    """The guides on the near side, gathered, with at most MOST_POINTS points."""
+def near_guides(lines: GuideLines, camera: Camera, turning: bool = False) -> GuideLines:
+    """The guides on the near side, gathered, with at most MOST_POINTS points.
+
+    turning : the camera moves: an even part of them, at most MOST_TURNING, with at most TURNING_POINTS.
+    """
     rows = shown_rows(lines, camera, near_only=True)
     rows = np.arange(len(lines.points)) if rows is None else rows
+    count = TURNING_POINTS if turning else MOST_POINTS
+    if turning:
+        rows = rows[:: -(-len(rows) // MOST_TURNING) or 1]
     return lines._replace(
-        points=fewer_points(lines.points, rows, MOST_POINTS), states=lines.states[rows],
+        points=fewer_points(lines.points, rows, count), states=lines.states[rows],
         normals=None if lines.normals is None else lines.normals[rows],
     )
 

@@ -17,8 +17,9 @@ from viewport.drawables.strands import CoatDrawable, StrandPrograms
 from viewport.kept import matched
 from viewport.light_maps import LightMaps
 from viewport.near_side import shown_rows
+from viewport.outline import Outline, extent
 from viewport.ribbons import Ribbons, drawn_points, far_to_near
-from viewport.scene import Coat, GuideLines, Scene, direction, scene_extent
+from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids
 
 LARGEST_TILE = 4096  # samples on a side
@@ -55,12 +56,14 @@ class Renderer:
         self.ribbons = Ribbons(ctx)
         self.light_maps = LightMaps(ctx, shadow_side)
         self.backdrop = Backdrop(ctx)
+        self.outline = Outline()
         self.coats: list[CoatDrawable] = []
         self.guides: list[GuideDrawable] = []
         self.tile: tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer] | None = None
 
     def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
         """Upload again, before the next picture, these rows of an array of hairs or guides written to in place."""
+        self.outline.changed()
         for coat in self.coats:
             if coat.coat.points is points:
                 coat.textures.mark(rows)
@@ -96,7 +99,7 @@ class Renderer:
         """Upload, draw the light's maps and shade every point, in steps; the done part 0 .. 1."""
         yield from self._upload(scene)
         toward = light_directions(scene, camera)
-        maps = self.light_maps.draw(scene, toward["key"], self.solids.meshes, self.coats)
+        maps = self.light_maps.draw(scene, toward["key"], self.solids.meshes, self.coats, self.outline.of(scene))
         lighting = yield from _told(maps, 0.3)
         uniforms = camera_uniforms(scene, camera, size) | lighting | light_uniforms(scene, toward)
         for things in (self.coats, self.guides):
@@ -122,7 +125,7 @@ class Renderer:
         """
         scene, camera, size = prepared.scene, prepared.camera, prepared.size
         view_row = -view_from_world(camera)[2]
-        low, high = scene_extent(scene)
+        low, high = extent(self.outline.of(scene))
         away = 1.0 if camera.orthographic else max(float(view_row @ [*(0.5 * (low + high)), 1.0]), camera.near)
         scale = pixel_scale(camera, size[1]) * (0.5 if near_only else samples) / away
         pieces, orders = [], []
@@ -169,7 +172,7 @@ class Renderer:
         for bottom in range(0, target.height, rows):
             target.scissor = (0, bottom, target.width, rows)
             self.light_maps.bind()
-            self.solids.draw(scene, camera, target, uniforms, prepared.options, samples)
+            self.solids.draw(scene, camera, target, uniforms, self.outline.of(scene), prepared.options, samples)
             target.scissor = None  # type: ignore[assignment]
             yield 0.05 * bottom / target.height
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]

@@ -166,18 +166,6 @@ def root_normals(points: np.ndarray, surface: Surface) -> Floats:
     return np.ascontiguousarray(surface.normals[cKDTree(surface.points).query(roots)[1]], dtype=np.float32)
 
 
-def scene_extent(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner (3,) of everything in the scene; a unit box when it is empty."""
-    lows, highs = [], []
-    for points in all_points(scene):
-        if len(points):
-            lows.append(points.min(axis=0))
-            highs.append(points.max(axis=0))
-    if not lows:
-        return np.full(3, -0.5), np.full(3, 0.5)
-    return np.min(lows, axis=0).astype(np.float64), np.max(highs, axis=0).astype(np.float64)
-
-
 def all_points(scene: Scene) -> list[np.ndarray]:
     """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (of many, every few)."""
     found = [surface.points for surface in scene.surfaces]

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from core.camera import Camera
 from core.workspace import ViewOptions
@@ -13,7 +15,8 @@ from viewport.drawables.grid import GridDrawable
 from viewport.drawables.mesh import GHOST_OPACITY, MeshDrawable, MeshPrograms
 from viewport.drawables.strands import ABSORPTION
 from viewport.kept import matched
-from viewport.scene import Color, Look, Scene, scene_extent
+from viewport.outline import extent
+from viewport.scene import Color, Look, Scene
 
 WIRE = (0.34, 0.36, 0.40, 1.0)  # linear RGB and opacity of edges alone
 WIRE_OVER = (0.010, 0.011, 0.013, 0.55)  # over shaded triangles
@@ -44,11 +47,11 @@ class Solids:
 
     def draw(
         self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, uniforms: dict[str, Any],
-        options: ViewOptions = PLAIN, samples: int = 1, quick: bool = False,
+        outline: NDArray[np.float32], options: ViewOptions = PLAIN, samples: int = 1, quick: bool = False,
     ) -> None:
         """Draw into color and depth of the target, which were cleared.
 
-        samples : of the target for a pixel, on a side. quick : light vertices alone.
+        outline : of the scene, (M, 3). samples : of the target for a pixel, on a side. quick : light vertices alone.
         """
         ctx = self.ctx
         target.use()
@@ -68,7 +71,7 @@ class Solids:
                 mesh.draw_edges(color, uniforms)
         target.depth_mask = False
         if options.grid:
-            low, high = scene_extent(scene)
+            low, high = extent(outline)
             self.grid.draw(camera, 0.5 * (low + high), uniforms, samples)
         ctx.enable(moderngl.CULL_FACE)
         for mesh in self.meshes:

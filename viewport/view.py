@@ -44,7 +44,7 @@ from viewport.context import collect
 from viewport.display_target import DisplayTarget, display_target
 from viewport.hud import LINE, ScreenImages, TextImage, plain_text
 from viewport.kept import same
-from viewport.light_maps import LightMaps
+from viewport.light_maps import LightMaps, alike
 from viewport.moving import Moving
 from viewport.overlay_drawing import TONES, Byte3, MarkDrawing, Words, axes_marks, labels, marks
 from viewport.pictures import Pictures, read_image
@@ -97,7 +97,8 @@ class View3D:
         self._given: tuple[Any, ...] | None = None
         self._targets: list[DisplayTarget] = []
         self._version = 0
-        self._lit: tuple[Any, ...] | None = None  # what the finished maps of the light were drawn for
+        # what the finished maps of the light were drawn for, and their light
+        self._lit: tuple[tuple[Any, ...], NDArray[np.float64]] | None = None
         self._lighting: dict[str, Any] = {}
         self._finished: tuple[Any, ...] | None = None  # what the last finished picture shows, and its number
         self._finished_number = 0
@@ -145,7 +146,7 @@ class View3D:
             return 0
         self._version += 1
         finished = None
-        if self._lit is not None and same(self._lit, self._light_key()):
+        if self._lit is not None and self._lit_alike():
             finished = self.renderer.light_maps, self._lighting
         target, picture = self._target(0), None
         if self._finished is not None and same(self._finished, self._picture_key()):
@@ -260,10 +261,15 @@ class View3D:
 
     # what is kept
 
-    def _light_key(self) -> tuple[Any, ...]:
+    def _light_key(self) -> tuple[tuple[Any, ...], NDArray[np.float64]]:
         assert self.camera is not None
         toward = light_directions(self.scene, self.camera)
-        return (*self.scene.surfaces, bool(self.scene.coats), self.scene.lights, tuple(toward["key"].tolist()))
+        return (*self.scene.surfaces, bool(self.scene.coats), self.scene.lights), toward["key"]
+
+    def _lit_alike(self) -> bool:
+        """True when the finished maps of the light do for a moving picture of now."""
+        lit, (key, toward) = self._lit, self._light_key()
+        return lit is not None and same(lit[0], key) and alike(lit[1], toward)
 
     def _picture_key(self) -> tuple[Any, ...]:
         """All that may not change for a finished picture to stay where nothing moves: all but points in place."""

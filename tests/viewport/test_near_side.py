@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from tests.viewport.scenes import FLAT, ball, camera, hairs
-from viewport.near_side import AWAY, MOST_COVER, WIDER, near_guides, shown_rows, sparse_coat, sparse_points
+from viewport.near_side import (
+    AWAY,
+    MOST_COVER,
+    MOST_TURNING,
+    TURNING_POINTS,
+    WIDER,
+    near_guides,
+    shown_rows,
+    sparse_coat,
+    sparse_points,
+)
 from viewport.scene import GuideLines
 
 SIZE, LARGE = (1600, 1000), (160_000, 100_000)
@@ -61,6 +71,12 @@ def test_guides_without_normals_are_all_drawn_and_others_from_the_near_side():
     _, coat = ball(600)
     turned = np.ascontiguousarray(coat.points.transpose(0, 2, 1))
     states = np.arange(600).astype(np.uint8) % 5
+    few = near_guides(GuideLines(turned, states), camera(), turning=True)
+    assert few.points.shape[1:] in ((3, TURNING_POINTS), (TURNING_POINTS, 3))
+    many = np.tile(turned, (-(-3 * MOST_TURNING // len(turned)), 1, 1))
+    thin = near_guides(GuideLines(many, np.arange(len(many), dtype=np.uint32)), camera(), turning=True)
+    assert MOST_TURNING // 2 < len(thin.points) <= MOST_TURNING
+    assert len(np.unique(np.diff(thin.states))) == 1, "even steps"
     every = near_guides(GuideLines(turned, states), camera())
     assert np.array_equal(every.points, turned)
     near = near_guides(GuideLines(turned, states, normals=coat.normals), camera())

@@ -11,6 +11,7 @@ from core.workspace import SHADINGS, ViewOptions
 from tests.viewport.scenes import ball, camera, quad
 from viewport.drawables.grid import ground_axes
 from viewport.drawables.mesh import map_colors, triangle_edges
+from viewport.outline import outline_points
 from viewport.renderer import Renderer
 from viewport.scene import Scene
 from viewport.solids import Solids
@@ -168,7 +169,7 @@ def test_quick_light_at_the_vertices_is_that_of_every_sample(ctx):
         target.clear(depth=1.0)
         renderer.light_maps.bind()
         assert isinstance(renderer.solids, Solids)
-        renderer.solids.draw(scene, cam, target, prepared.uniforms, quick=quick)
+        renderer.solids.draw(scene, cam, target, prepared.uniforms, outline_points(scene), quick=quick)
         images.append(np.frombuffer(color.read(), np.float32).reshape(H, W, 4).copy())
     assert np.array_equal(images[0][..., 3] > 0.5, images[1][..., 3] > 0.5)
     lit = images[0][..., 3] > 0

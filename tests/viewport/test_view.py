@@ -78,6 +78,60 @@ def test_hair_is_where_it_projects_and_nowhere_else(view, present, orthographic)
     assert not differs[away > 8.0].any()
 
 
+def turned(degrees, eye=4.0):
+    angle = np.radians(degrees)
+    return camera((eye * np.sin(angle), 0.0, eye * np.cos(angle)))
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_a_turning_view_keeps_its_light_a_while_and_looks_as_if_it_had_not(ctx, view, present, finished):
+    skin, coat = ball(6000, look=FLAT._replace(root_width=0.012, tip_width=0.004))
+    scene = Scene((skin,), (coat,))
+    moving(view, present, scene, turned(0.0), count=6000)
+    if finished:
+        refined(view)
+        there = present()
+        first = moving(view, present, scene, turned(0.0), count=6000)
+        assert first.mean() == pytest.approx(there.mean(), rel=0.02)
+    for degrees in (1.0, 3.5, 8.0, 60.0):
+        image = moving(view, present, scene, turned(degrees), count=6000)
+        fresh = View3D(ctx, shadow_side=256)
+        fresh.begin(scene, turned(degrees), (W, H), BARE)
+        fresh.draw_interactive(6000)
+        color = ctx.texture((W, H), 4)
+        target = ctx.framebuffer([color])
+        fresh.present(target, (W, H))
+        own = np.frombuffer(target.read(components=3, alignment=1), np.uint8).reshape(H, W, 3)[::-1].astype(int)
+        fresh.release()
+        target.release()
+        color.release()
+        assert image.mean() == pytest.approx(own.mean(), rel=0.01)
+        assert np.abs(image - own).mean() < 2.0
+        if degrees >= 8.0:
+            assert np.array_equal(image, own), "the light was drawn anew"
+
+
+def test_all_guides_are_back_when_the_view_stands_still(view, present):
+    rng = np.random.default_rng(2)
+    roots = np.stack([*rng.uniform(-1.0, 1.0, (2, 2000)), np.zeros(2000)], axis=1)
+    up = np.linspace(0.0, 0.05, 8)[None, :, None] * [0.0, 1.0, 0.0]
+    lines = GuideLines((roots[:, None] + up).astype(np.float32), np.zeros(2000, np.uint8))
+    scene = Scene(guides=(lines,))
+    still = moving(view, present, scene, camera())
+    moving(view, present, scene, turned(3.0))
+    passing = moving(view, present, scene, camera())
+    view.draw_interactive(3000)
+    after = present()
+    assert np.array_equal(after, still)
+    assert (passing != still).any(axis=2).mean() > 0.02
+    moving(view, present, scene, turned(2.0))
+    view.begin(scene, camera(), (W, H), BARE)
+    refined(view)
+    finished = present()
+    view.draw_interactive(3000)  # nothing has moved: the finished picture, whatever was drawn before
+    assert np.array_equal(present(), finished)
+
+
 def test_skin_hides_hair_behind_it_in_a_moving_picture(view, present):
     cam = camera()
     skin = quad(half=0.5)._replace(covered=False)
