@@ -110,7 +110,7 @@ def solve_centres(
     symmetric = bool((each == each[0]).all())
     plane = None
     if settings.affine or settings.kernel in AFFINE:
-        plane = _plane(centres, usual, dofs, names, float(np.abs(matrix).sum(axis=1).max()))
+        plane = _plane(centres, usual, dofs, names, float(np.abs(matrix).sum(axis=1).max()) or 1.0)
     system = _system(matrix, centres, plane, settings.smoothing)
     if not symmetric:
         _refuse_turned(matrix, system, centres, usual, phi, plane, settings, names)

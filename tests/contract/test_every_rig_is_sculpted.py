@@ -37,7 +37,7 @@ def some_poses(rig):
     if len(both) == 2:
         poses.append(Pose(name="both", rotations=both))
     for control in [c for c in rig.controls if c.kind == "number"][:2]:
-        far = max(control.low, control.high, key=lambda at: abs(at - control.rest))  # noqa: B023
+        far = max(control.low, control.high, key=lambda at: abs(at - control.rest))
         poses.append(Pose(name=f"{control.name} to its end", numbers={control.name: far}))
     return poses
 

@@ -199,6 +199,16 @@ def test_poses_in_a_plane_are_refused_and_unused_axes_are_not(seed, dimensions, 
     assert set(refused.value.poses) == {"rest", *(f"p{k}" for k in range(len(flat)))}
 
 
+@pytest.mark.parametrize("name", KERNELS)
+@pytest.mark.parametrize("apart", [1e-3, 0.5, 1.0, 1.0 + 1e-12, 2.0, 50.0])
+def test_a_single_pose_however_far(name, apart):
+    """At a distance of 1 the thin plate is 0, everywhere between two poses."""
+    solved = solve(numbers_space([[apart]], kernel=name))
+    found = weights_at(solved, np.array([[0.0], [apart], [0.5 * apart]]))[:, 1]
+    assert np.allclose(found[:2], [0.0, 1.0], atol=1e-9)
+    assert 0.0 <= found[2] < 1.0
+
+
 def test_a_hinge_is_not_a_plane():
     for axis in ((0, 0, 1), (0.3, 0.2, 0.9), (1, 0, 0)):
         hinge = [Pose(name=str(t), rotations={"j0": tuple(
