@@ -15,6 +15,7 @@ from core.formats.rig_file import READ_SUFFIXES, read_rig
 from core.pose.clip import local_matrices, numbers_at
 from core.pose.rig import Rig, all_clips, playing
 from core.pose.skinning import deformed, posed_points
+from tests.contract.hostile import gltf_files
 from tests.core.formats.gltf_truth import gltf_points
 
 DATA = Path(os.environ.get("FILOPLUME_DATA", "../shared/data"))
@@ -74,14 +75,17 @@ def baked_points(path: Path, frame: float) -> np.ndarray:
 @pytest.mark.parametrize(("source", "baked"), BAKED)
 def test_every_frame_is_as_usdskel_baked_it(source, baked):
     found = read_rig(BAKE / source)
+    stage = Usd.Stage.Open(str(BAKE / "baseline" / baked))
     times = sorted({
-        t for prim in Usd.Stage.Open(str(BAKE / "baseline" / baked)).Traverse() if prim.IsA(UsdGeom.Mesh)
+        t for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)
         for t in UsdGeom.Mesh(prim).GetPointsAttr().GetTimeSamples()
     })
     assert len(times) > 9
     worst = moved = 0.0
     still = in_file_order(found.rig, found.mesh.points)
     truths = [baked_points(BAKE / "baseline" / baked, time) for time in times]
+    if found.up == "z":
+        truths = [truth[:, [0, 2, 1]] * [1, 1, -1] for truth in truths]
     own = np.ones(len(still), bool)
     if source == "blendshapes.usda":  # its first mesh is the truth of the second, and no part of the rig
         own[: len(still) // 2] = False
@@ -90,7 +94,7 @@ def test_every_frame_is_as_usdskel_baked_it(source, baked):
         worst = max(worst, np.abs(points - truth)[own].max() / np.ptp(truth, axis=0).max())
         moved = max(moved, np.abs(points - still)[own].max())
     assert worst <= 1e-5
-    assert moved > 0.1
+    assert moved > 0.1 or source == "blendshapesWithNormals.usda"  # whose shapes move its normals alone
 
 
 GLTF = [n for n in RIGS if n.endswith(("gltf", "glb")) and "quad_skin" not in n]
@@ -188,3 +192,41 @@ def test_usd_with_eight_influences_scaled_root_and_z_up(tmp_path):
         truth = truth[:, [0, 2, 1]] * [1, 1, -1]
         points_now = posed_points(found.mesh.points, found.rig, frame)
         assert np.abs(points_now - truth).max() <= 2e-5 * np.ptp(truth, axis=0).max()
+
+
+@pytest.mark.parametrize("path", sorted(ANIMATION.rglob("*.fbx")), ids=lambda p: p.name)
+def test_fbx_is_refused_in_a_sentence(path):
+    with pytest.raises(UserError, match="is an FBX file, which is not read; export the rig as USD or glTF"):
+        read_rig(path)
+
+
+@pytest.mark.parametrize(("name", "data"), sorted(gltf_files().items()), ids=lambda x: x if isinstance(x, str) else "")
+def test_hostile_gltf_is_read_or_refused(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    try:
+        found = read_rig(tmp_path / name)
+    except UserError:
+        return
+    assert found.mesh is not None
+
+
+@pytest.mark.parametrize("name", [
+    "fox_gltf/animated/Fox.glb", "morph_gltf_assimp/simple_skin/simple_skin.gltf", "libigl_skin_A/arm.tgf",
+    "morph_gltf_assimp/simple_skin/quad_skin.glb",
+])
+def test_damaged_copies_are_read_or_refused(tmp_path, name):
+    rng = np.random.default_rng(7)
+    whole = (ANIMATION / name).read_bytes()
+    path = tmp_path / Path(name).name
+    for number in range(120):
+        data = bytearray(whole)
+        head = min(len(data), 40_000)
+        for at in rng.integers(0, head, 1 + number % 8):
+            data[at] = rng.choice([0, 45, 48, 57, 91, 123, 125, 255, int(rng.integers(256))])
+        path.write_bytes(data[: rng.integers(1, len(data))] if number % 5 == 0 else data)
+        try:
+            found = read_rig(path)
+        except UserError:
+            continue
+        if found.mesh is not None:
+            assert np.isfinite(posed_points(found.mesh.points, found.rig, 3)).all()
