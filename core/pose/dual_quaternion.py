@@ -56,6 +56,7 @@ def skin_dual_quaternion(
         for k in range(joints.shape[1]):
             if weights[v, k] > most:
                 most, pivot = weights[v, k], joints[v, k]
+        ax, ay, az, aw = real[pivot, 0], real[pivot, 1], real[pivot, 2], real[pivot, 3]
         rx = ry = rz = rw = dx = dy = dz = dw = sx = sy = sz = 0.0
         for k in range(joints.shape[1]):
             w = float64(weights[v, k])
@@ -63,29 +64,25 @@ def skin_dual_quaternion(
                 continue
             j = joints[v, k]
             if len(stretch) > 0:
-                s = stretch[j]
-                sx += w * (s[0, 0] * px + s[0, 1] * py + s[0, 2] * pz)
-                sy += w * (s[1, 0] * px + s[1, 1] * py + s[1, 2] * pz)
-                sz += w * (s[2, 0] * px + s[2, 1] * py + s[2, 2] * pz)
-            a, b = real[pivot], real[j]
-            if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] < 0.0:
+                sx += w * (stretch[j, 0, 0] * px + stretch[j, 0, 1] * py + stretch[j, 0, 2] * pz)
+                sy += w * (stretch[j, 1, 0] * px + stretch[j, 1, 1] * py + stretch[j, 1, 2] * pz)
+                sz += w * (stretch[j, 2, 0] * px + stretch[j, 2, 1] * py + stretch[j, 2, 2] * pz)
+            if ax * real[j, 0] + ay * real[j, 1] + az * real[j, 2] + aw * real[j, 3] < 0.0:
                 w = -w  # the same rotation, from the side of the strongest joint
-            rx += w * b[0]
-            ry += w * b[1]
-            rz += w * b[2]
-            rw += w * b[3]
-            d = dual[j]
-            dx += w * d[0]
-            dy += w * d[1]
-            dz += w * d[2]
-            dw += w * d[3]
+            rx += w * real[j, 0]
+            ry += w * real[j, 1]
+            rz += w * real[j, 2]
+            rw += w * real[j, 3]
+            dx += w * dual[j, 0]
+            dy += w * dual[j, 1]
+            dz += w * dual[j, 2]
+            dw += w * dual[j, 3]
         if len(stretch) > 0:
             px, py, pz = sx, sy, sz
         length = np.sqrt(rx * rx + ry * ry + rz * rz + rw * rw)
         if length < 1e-12:  # no joint moves it, or its joints cancel out
-            r, d = real[pivot], dual[pivot]
-            rx, ry, rz, rw, dx, dy, dz, dw = r[0], r[1], r[2], r[3], d[0], d[1], d[2], d[3]
-            length = 1.0
+            rx, ry, rz, rw, length = ax, ay, az, aw, 1.0
+            dx, dy, dz, dw = dual[pivot, 0], dual[pivot, 1], dual[pivot, 2], dual[pivot, 3]
         rx, ry, rz, rw = rx / length, ry / length, rz / length, rw / length
         dx, dy, dz, dw = dx / length, dy / length, dz / length, dw / length
         tx = 2.0 * (rw * dx - dw * rx + ry * dz - rz * dy)
