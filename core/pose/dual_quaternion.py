@@ -5,6 +5,8 @@ Scale and shear of a joint, which no dual quaternion has, are blended as matrice
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numba.core.types import Array, float32, float64, int32, int64, void
@@ -67,8 +69,8 @@ def skin_dual_quaternion(
                 sx += w * (stretch[j, 0, 0] * px + stretch[j, 0, 1] * py + stretch[j, 0, 2] * pz)
                 sy += w * (stretch[j, 1, 0] * px + stretch[j, 1, 1] * py + stretch[j, 1, 2] * pz)
                 sz += w * (stretch[j, 2, 0] * px + stretch[j, 2, 1] * py + stretch[j, 2, 2] * pz)
-            if ax * real[j, 0] + ay * real[j, 1] + az * real[j, 2] + aw * real[j, 3] < 0.0:
-                w = -w  # the same rotation, from the side of the strongest joint
+            # the same rotation, from the side of the strongest joint
+            w = math.copysign(w, ax * real[j, 0] + ay * real[j, 1] + az * real[j, 2] + aw * real[j, 3])
             rx += w * real[j, 0]
             ry += w * real[j, 1]
             rz += w * real[j, 2]
@@ -83,8 +85,9 @@ def skin_dual_quaternion(
         if length < 1e-12:  # no joint moves it, or its joints cancel out
             rx, ry, rz, rw, length = ax, ay, az, aw, 1.0
             dx, dy, dz, dw = dual[pivot, 0], dual[pivot, 1], dual[pivot, 2], dual[pivot, 3]
-        rx, ry, rz, rw = rx / length, ry / length, rz / length, rw / length
-        dx, dy, dz, dw = dx / length, dy / length, dz / length, dw / length
+        over = 1.0 / length
+        rx, ry, rz, rw = rx * over, ry * over, rz * over, rw * over
+        dx, dy, dz, dw = dx * over, dy * over, dz * over, dw * over
         tx = 2.0 * (rw * dx - dw * rx + ry * dz - rz * dy)
         ty = 2.0 * (rw * dy - dw * ry + rz * dx - rx * dz)
         tz = 2.0 * (rw * dz - dw * rz + rx * dy - ry * dx)
