@@ -7,12 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from core.falloff import Shape, falloff
 from core.groom.guides import Guides
+from core.groom.project_strands import project_strands
 from core.groom.region import View, distance_to_path, facing
 from core.groom.rows import take_rows
 from core.rows import changed_rows
 from tools.respect import rows_of
 
-FAR = 1e9  # pixels, where points behind the eye are put
 FLAT = 0.25  # of the radius, of the falloff "flat"
 
 
@@ -29,15 +29,8 @@ class Screen:
 
     def _put(self, guides: Guides) -> None:
         self.ids, self._points = guides.ids, guides.points
-        self.pixels = self._project(guides.points)
-        self.low = self.pixels.min(axis=1, initial=FAR)
-        self.high = self.pixels.max(axis=1, initial=-FAR)
+        self.pixels, self.low, self.high = project_strands(guides.points, self.view)
         self.seen = facing(guides, self.view)
-
-    def _project(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
-        pixels, w = self.view.pixels(points)
-        pixels[w <= 0.0] = FAR
-        return pixels
 
     def follow(self, guides: Guides) -> None:
         """Find the strands of `guides` that moved, came or went since."""
@@ -55,8 +48,7 @@ class Screen:
             new = np.flatnonzero(~there)
             self.seen[new] = facing(take_rows(guides, new), self.view)
         rows = np.union1d(new, changed_rows(self._points, guides.points))
-        self.pixels[rows] = self._project(guides.points[rows])
-        self.low[rows], self.high[rows] = self.pixels[rows].min(axis=1), self.pixels[rows].max(axis=1)
+        self.pixels[rows], self.low[rows], self.high[rows] = project_strands(guides.points[rows], self.view)
         self._points = guides.points
 
     def near(self, path: NDArray[np.float64], radius: float, through: bool = True) -> NDArray[np.int64]:
