@@ -74,7 +74,7 @@ FILE: tuple[Command, ...] = (
         icon="export", words="write hair curves publish deliver"),
     Command(
         "file.screenshot", "Save a picture…", "Saves what the viewport shows now as a PNG of the same size.",
-        lambda w: w.save_screenshot(), "viewport.picture.render_png", "file", icon="picture",
+        lambda w: w.save_screenshot(), "viewport.picture.render_png", "file", icon="image",
         words="screenshot image render png"),
     Command(
         "file.playblast", "Playblast…", "Plays the frames once and saves them as numbered pictures or a movie.",

@@ -343,7 +343,7 @@ class Outliner(QTreeView):
         mesh, view = self.mesh_of(item), self._desk.workspace.view
         add(menu, "Rename\tF2", None, "Gives it another name; a double click does too.", lambda: self.edit(index))
         whole = isinstance(item, MeshObject)
-        add(menu, "Show" if item.hidden else "Hide", "show" if item.hidden else "hide",
+        add(menu, "Show" if item.hidden else "Hide", "eye" if item.hidden else "eye-off",
             "Leaves the mesh and its hair out of the view, in the project too." if whole else
             "Leaves the groom out of the view, of pictures and of exports.", lambda: self.toggle_hidden(item))
         add(menu, "Unlock" if item.locked else "Lock", "unlock" if item.locked else "lock",

@@ -200,11 +200,11 @@ VIEW: tuple[Command, ...] = (
     Command(
         "view.hide", "Hide", "Hides the active mesh and its grooms, in the project too.",
         _hide, "tools.document_edits.set_mesh_hidden", "document", undo="Hide", enabled=_needs_something,
-        scope="viewport", icon="hide", words="invisible"),
+        scope="viewport", icon="eye-off", words="invisible"),
     Command(
         "view.unhide_all", "Show all", "Shows every hidden, isolated or ghosted mesh and groom the way it was.",
         _unhide, "tools.scene.show_all", "document", undo="Show all", enabled=_needs_hidden, scope="viewport",
-        icon="show", words="unhide reveal visible"),
+        icon="eye", words="unhide reveal visible"),
     Command(
         "view.background", "Background image…", "Puts a picture behind everything in the view, fitted to its height.",
         lambda w: w.choose_background(), _OPTIONS, icon="image", words="plate photo image"),
