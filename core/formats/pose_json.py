@@ -1,0 +1,229 @@
+"""Poses and their sculpts in JSON, as a person or a script writes them: ``filoplume pose``.
+
+POSES.json::
+
+    {"kernel": "gaussian", "poses": [{"name": "bent", "controls": {"elbow": {"rotate": [0, 0, 110]}, "smile": 1.0},
+                                      "sculpt": "bent.obj", "falloff": {"elbow": 45}}]}
+
+POSE.json: ``{"controls": {...}}`` in the same form, or ``{"clip": "walk", "frame": 1012.5}``. Rotations are degrees
+about x, then y, then z of the joint at rest; translations (``"translate"``) metres in its parent. Falloffs are degrees
+for joints that turn, metres for joints that only move, and units for numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import UserError
+from core.formats.mesh_file import READ_SUFFIXES, read_mesh
+from core.formats.text_numbers import text_bytes
+from core.pose.layers import Sculpt
+from core.pose.pose import Pose
+from core.pose.pose_space import REST_NAME, Kernel
+from core.pose.rig import Rig, clip_named, control_names, playing
+from core.pose.rotation import quaternion_from_euler
+from core.pose.synthesis import pose_at
+
+LARGEST_JSON = 64 << 20  # bytes
+Three = tuple[float, float, float]
+
+
+class Movement(msgspec.Struct, forbid_unknown_fields=True):
+    """What a joint does: degrees about x, y and z, and metres in its parent."""
+
+    rotate: Three | None = None
+    translate: Three | None = None
+
+
+Controls = dict[str, float | Movement]
+
+
+class _Sculpted(msgspec.Struct, forbid_unknown_fields=True):
+    name: str
+    controls: Controls
+    sculpt: str | None = None
+    falloff: dict[str, float] = {}
+
+
+class _Poses(msgspec.Struct, forbid_unknown_fields=True):
+    poses: list[_Sculpted]
+    kernel: Kernel = "gaussian"
+    normalise: Literal["none", "above-one", "always"] = "none"
+    affine: bool = False
+    clamp: bool = False
+    smoothing: float = 0.0
+    table: int = 0
+    weighted: int = 0
+
+
+class _Moment(msgspec.Struct, forbid_unknown_fields=True):
+    controls: Controls | None = None
+    clip: str | None = None
+    frame: float | None = None
+
+
+class PoseFile(NamedTuple):
+    """Sculpts at poses of a rig, and the fields of their pose spaces; notes are sentences to show."""
+
+    sculpts: tuple[Sculpt, ...]
+    options: dict[str, Any]
+    notes: tuple[str, ...]
+
+
+class Moment(NamedTuple):
+    """A pose; of a frame of a clip also the rig that plays it, for its joints may be scaled as no pose says."""
+
+    pose: Pose
+    rig: Rig
+    frame: float | None
+
+
+def read_poses(path: Path, rig: Rig) -> PoseFile:
+    """Read POSES.json and the sculpts it names, which lie beside it.
+
+    Raises
+    ------
+    UserError
+        Naming the file, the pose, and the control, file or number that is wrong.
+    """
+    said = _decoded(path, _Poses)
+    names = [pose.name for pose in said.poses]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UserError(f"{path.name} has the pose {twice[0]!r} more than once; give every pose a name of its own.")
+    sculpts, notes = [], []
+    for item in said.poses:
+        where = f"{path.name}, pose {item.name!r}"
+        if item.name == REST_NAME or not 0 < len(item.name) <= 255 or not item.name.isprintable():
+            raise UserError(f"{where}: a pose needs a name of its own, not {REST_NAME!r}, which is always there.")
+        pose = _pose(item.name, item.controls, rig, where)
+        falloffs = {}
+        for control, reach in item.falloff.items():
+            _check_control(control, rig, where)
+            if not 1e-6 <= reach <= 1e6:
+                raise UserError(f"{where}: the falloff of {control!r} must be above 0, not {reach:g}.")
+            if control not in {*pose.rotations, *pose.translations, *pose.numbers}:
+                notes.append(f"{where}: the falloff of {control!r} has no effect, for the pose does not set it.")
+                continue
+            falloffs[control] = (math.radians(reach) if control in pose.rotations else reach,)
+        target = None if item.sculpt is None else read_sculpt(path.parent / item.sculpt, rig, where)
+        sculpts.append(Sculpt(pose, target, falloffs))
+    fields = [name for name in _Poses.__struct_fields__ if name != "poses"]
+    if not 0.0 <= said.smoothing <= 1e3 or not 0 <= said.weighted <= 64 or said.table not in (0, *range(2, 65537)):
+        raise UserError(f"{path.name}: smoothing goes from 0 to 1000, weighted from 0 to 64, table from 2 to 65536.")
+    return PoseFile(tuple(sculpts), {name: getattr(said, name) for name in fields}, tuple(notes))
+
+
+def read_moment(path: Path, rig: Rig) -> Moment:
+    """Read POSE.json.
+
+    Raises
+    ------
+    UserError
+        Naming the file and what is wrong.
+    """
+    said = _decoded(path, _Moment)
+    if said.clip is not None:
+        if said.controls is not None or said.frame is None:
+            raise UserError(f'{path.name} must say either "controls", or "clip" and "frame".')
+        clip = clip_named(rig, said.clip)
+        return Moment(pose_at(playing(rig, clip.name), said.frame), playing(rig, clip.name), said.frame)
+    if said.controls is None or said.frame is not None:
+        raise UserError(f'{path.name} must say either "controls", or "clip" and "frame".')
+    return Moment(_pose("pose", said.controls, rig, path.name), rig, None)
+
+
+def read_sculpt(path: Path, rig: Rig, where: str) -> NDArray[np.float64]:
+    """The surface (V, 3) of a sculpt, metres, from a file with the vertices of the rig's file in its order.
+
+    Vertices that a seam had split in that file are one in the mesh; their mean is taken.
+
+    Raises
+    ------
+    UserError
+        When the file is missing, of an unknown kind, damaged, or has another number of vertices.
+    """
+    try:
+        if path.suffix.lower() == ".obj":
+            points = _obj_points(path)
+        elif path.suffix.lower() in READ_SUFFIXES:
+            found = read_mesh(path)
+            points = found.mesh.points.astype(np.float64)[found.vertex_of_file]
+        else:
+            raise UserError(f"{path.name} is no mesh file; export the sculpt as OBJ or USD.")
+    except OSError as error:
+        raise UserError(f"{where}: the sculpt {path.name} cannot be opened ({error.strerror or error}).") from None
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from error
+    vertices = len(rig.skin.joints)
+    there = np.arange(vertices) if rig.file_vertices is None else rig.file_vertices
+    if len(points) != len(there):
+        raise UserError(
+            f"{where}: the sculpt {path.name} has {len(points)} vertices and the rig {len(there)}; export the sculpt "
+            "with all vertices, in the order of the rig's file."
+        )
+    if not np.isfinite(points).all():
+        raise UserError(f"{where}: the sculpt {path.name} has vertices that are no finite numbers; export it again.")
+    count = np.bincount(there, minlength=vertices)
+    total = np.stack([np.bincount(there, points[:, k], minlength=vertices) for k in range(3)], axis=1)
+    if not count.all():
+        raise UserError(f"{where}: the rig has vertices that its file does not have; read the rig again.")
+    return np.asarray(total / count[:, None], np.float64)
+
+
+def _obj_points(path: Path) -> NDArray[np.float64]:
+    """The ``v`` lines of an OBJ file; nothing else of it matters, so a bare list of points will do."""
+    data = text_bytes(path.read_bytes(), path.name)
+    lines = re.findall(rb"^[ \t]*v[ \t]+([^\r\n#]+)", data, re.MULTILINE)
+    try:
+        return np.array([[float(word) for word in line.split()[:3]] for line in lines], np.float64).reshape(-1, 3)
+    except ValueError:
+        raise UserError(f"{path.name} has a vertex that is not three numbers; export it again.") from None
+
+
+def _pose(name: str, controls: Controls, rig: Rig, where: str) -> Pose:
+    joints = set(rig.skeleton.names)
+    rotations: dict[str, Any] = {}
+    translations: dict[str, Three] = {}
+    numbers: dict[str, float] = {}
+    for control, value in controls.items():
+        _check_control(control, rig, where)
+        if isinstance(value, Movement):
+            if control not in joints:
+                raise UserError(f"{where}: {control!r} is a number, not a joint; give it as {control!r}: 1.0.")
+            if value.rotate is not None:
+                rotations[control] = tuple(map(float, quaternion_from_euler(value.rotate)))
+            if value.translate is not None:
+                translations[control] = value.translate
+        elif control in joints:
+            raise UserError(f'{where}: {control!r} is a joint; give it as {control!r}: {{"rotate": [x, y, z]}}.')
+        else:
+            numbers[control] = float(value)
+    return Pose(name=name, rotations=rotations, translations=translations, numbers=numbers)
+
+
+def _check_control(name: str, rig: Rig, where: str) -> None:
+    known = control_names(rig)
+    if name not in known:
+        raise UserError(f"{where}: there is no control {name!r}; choose one of {', '.join(known[:20])}.")
+
+
+_T = TypeVar("_T")
+
+
+def _decoded(path: Path, kind: type[_T]) -> _T:
+    try:
+        if path.stat().st_size > LARGEST_JSON:
+            raise UserError(f"{path.name} is too large for a list of poses.")
+        return msgspec.json.decode(path.read_bytes(), type=kind)
+    except OSError as error:
+        raise UserError(f"{path.name} cannot be opened ({error.strerror or error}).") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise UserError(f"{path.name} cannot be read: {str(error).rstrip('.')}.") from None
