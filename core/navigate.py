@@ -100,6 +100,18 @@ def frame(camera: Camera, points_in_world: ArrayLike, aspect: float) -> Camera:
     )
 
 
+def whole_in(camera: Camera, aspect: float, window_aspect: float) -> Camera:
+    """A camera whose own picture has `aspect`, opened so far that a window of another shape shows all of that picture.
+
+    A narrower window keeps the picture's width, a wider one its height; what is beside it is seen, too.
+    """
+    more = max(aspect / window_aspect, 1.0)
+    if camera.orthographic:
+        return camera.replace(height=float(np.clip(camera.height * more, NEAREST, FARTHEST)))
+    half = math.atan(more * math.tan(0.5 * camera.field_of_view))
+    return camera.replace(field_of_view=min(2.0 * half, 3.1))
+
+
 def turned_to(camera: Camera, pivot: ArrayLike, direction: ArrayLike, up: ArrayLike = UP) -> Camera:
     """The camera looking along `direction`, with the pivot in the middle, as far away as it was."""
     ahead, axis = np.asarray(normalized(direction)), np.asarray(normalized(up))

@@ -43,7 +43,7 @@ def read_in_child(path: str) -> dict[str, Any]:
                 sample = schema.getValue()
                 local = np.array(sample.getMatrix(), np.float64).reshape(4, 4)
                 inner = local @ world if sample.getInheritsXforms() else local
-                _read_properties(schema.getUserProperties(), said)
+                read_properties(schema.getUserProperties(), said)
             waiting.append((child, inner))
         for kind in (AbcGeom.IPolyMesh, AbcGeom.ISubD):
             if parent.getParent() and kind.matches(parent.getHeader()):
@@ -105,7 +105,7 @@ def _write_mesh(
     AbcGeom.OPolyMesh(AbcGeom.OXform(parent, name), f"{name}Shape").getSchema().set(sample)
 
 
-def _read_properties(properties: Any, said: dict[str, Any]) -> None:
+def read_properties(properties: Any, said: dict[str, Any]) -> None:
     from alembic3d import Abc
 
     if properties.valid():

@@ -77,9 +77,31 @@ class Animation(msgspec.Struct):
     name: str = ""
 
 
+class Perspective(msgspec.Struct, rename="camel"):
+    yfov: float = 0.6
+    znear: float = 0.01
+    zfar: float | None = None
+    aspect_ratio: float | None = None
+
+
+class Orthographic(msgspec.Struct):
+    xmag: float = 1.0
+    ymag: float = 1.0
+    znear: float = 0.01
+    zfar: float = 1000.0
+
+
+class GltfCamera(msgspec.Struct):
+    type: str
+    name: str = ""
+    perspective: Perspective | None = None
+    orthographic: Orthographic | None = None
+
+
 class Node(msgspec.Struct):
     name: str = ""
     mesh: int | None = None
+    camera: int | None = None
     skin: int | None = None
     children: list[int] = []
     matrix: tuple[float, ...] | None = None
@@ -100,6 +122,7 @@ class Gltf(msgspec.Struct, rename="camel"):
     meshes: list[GltfMesh] = []
     skins: list[Skin] = []
     animations: list[Animation] = []
+    cameras: list[GltfCamera] = []
     accessors: list[Accessor] = []
     buffer_views: list[BufferView] = []
     buffers: list[Buffer] = []
