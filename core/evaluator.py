@@ -86,6 +86,13 @@ class Evaluator:
                 self._remove(next(iter(self._entries)))
         return value
 
+    def knows(self, function: Callable[..., Any], *inputs: Any, **parameters: Hashable) -> bool:
+        """True when :meth:`get` would answer at once."""
+        plain = tuple((name, type(value), value) for name, value in sorted(parameters.items()))
+        with self._lock:
+            self._bury()
+            return self._find((function, plain, tuple(map(id, inputs))), inputs) is not None
+
     def buffer(self, name: Hashable, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """The writable array of that name; a new one of zeros when it does not exist in this shape and dtype."""
         have = self.buffers.get(name)

@@ -9,7 +9,7 @@ from core.document import MeshObject
 from core.evaluator import Evaluator
 from core.mesh.distance_field import DistanceField, build_distance_field
 from core.mesh.mesh import Mesh
-from core.mesh.skin import FIELD_CELLS, Skin, distance_field, skin_at_rest, skin_posed
+from core.mesh.skin import FIELD_CELLS, Skin, distance_field, distance_field_known, skin_at_rest, skin_posed
 from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
 from core.pose.skinning import posed_points
@@ -37,6 +37,14 @@ def field_at(item: MeshObject, frame: float | None, evaluator: Evaluator) -> Dis
     if skin.points is item.mesh.points:
         return distance_field(item.mesh, evaluator)
     return evaluator.get(_field, item.mesh, skin.points, evaluator=evaluator)
+
+
+def field_known(item: MeshObject, frame: float | None, evaluator: Evaluator) -> bool:
+    """True when :func:`field_at` would answer at once; making one takes a few tenths of a second."""
+    skin = skin_at(item, frame, evaluator)
+    if skin.points is item.mesh.points:
+        return distance_field_known(item.mesh, evaluator)
+    return evaluator.knows(_field, item.mesh, skin.points, evaluator=evaluator)
 
 
 def points_at(

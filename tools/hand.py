@@ -8,6 +8,7 @@ back. Pose, symmetry and what is respected are dealt with here, so that tools ar
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
@@ -20,7 +21,7 @@ from core.groom.groom import Groom
 from core.groom.guides import Guides
 from core.groom.region import View
 from core.overlay import Circle, Overlays
-from core.posed import skin_at
+from core.posed import field_at, field_known, skin_at
 from core.workspace import Respect
 from tools.pen import Pen, PenSettings
 from tools.pose import BackToRest, in_pose
@@ -49,11 +50,15 @@ class StrokeRecord(NamedTuple):
 class Hand:
     """What presses, drags and releases do to the session's document. Used from one thread.
 
+    waits : a stroke begins only when what it collides with is there, which may take a few tenths of a second after
+        the frame was changed. Otherwise it begins at once, goes through the skin until that is there (another thread
+        makes it), and is then made again from its samples: the document comes out the same.
     pen : settings of the pen. recorded : called with every finished stroke; what records macros sets it.
     """
 
     def __init__(self, session: Session) -> None:
         self.session = session
+        self.waits = True
         self.pen = PenSettings()
         self.recorded: Callable[[StrokeRecord], None] | None = None
         self._pen = Pen(self.pen)
@@ -64,6 +69,8 @@ class Hand:
         self._record: StrokeRecord | None = None
         self._back: BackToRest | None = None
         self._ground: tuple[tuple[Any, ...], tuple[Ground, ...]] | None = None
+        self._bare = False  # the stroke does not collide yet
+        self._prepared: tuple[Any, ...] | None = None  # what was last handed out to be prepared
 
     @property
     def stroking(self) -> bool:
@@ -86,6 +93,10 @@ class Hand:
         self._strokes = [(tool.begin(ground, first), ground) for ground in grounds]
         self._tool, self._guides = tool, grounds[0].guides
         self._batches = []
+        self._bare = tool.edits == "shape" and grounds[0].field is None
+        work = self.preparation() if self._bare else None
+        if work is not None:
+            Thread(target=work, name="skin for the hand", daemon=True).start()
         workspace = self.session.workspace
         self._record = StrokeRecord(
             tool.name, msgspec.to_builtins(tool.params), grounds[0].groom.id, workspace.frame, workspace.respect,
@@ -109,6 +120,9 @@ class Hand:
             self._extend(behind)
         tool = self._tool
         try:
+            if self._bare:
+                field_at(self._strokes[0][1].item, self._strokes[0][1].frame, self.session.evaluator)
+                self._make_again()
             guides = self._guides
             for stroke, _ in self._strokes:
                 assert guides is not None
@@ -189,20 +203,54 @@ class Hand:
             params |= {name: getattr(tool.params, name) for name in RingParams.__struct_fields__}
         return session.tools.make(turn.tool, {**params, **turn.params})
 
+    def preparation(self) -> Callable[[], object] | None:
+        """What a press at the present frame would wait for, to be called on any thread; None when nothing is.
+
+        The same is handed out once.
+        """
+        session, frame, evaluator = self.session, self.session.workspace.frame, self.session.evaluator
+        try:
+            item = mesh_to_edit(session.history.current, session.groom)
+        except UserError:
+            return None
+        frames = [at for at in (frame, None) if not field_known(item, at, evaluator)]
+        key = item.mesh, item.rig, item.correctives, frame
+        same = self._prepared is not None and all(a is b or a == b for a, b in zip(self._prepared, key, strict=True))
+        if not frames or same:
+            return None
+        self._prepared = key
+        return lambda: [field_at(item, at, evaluator) for at in frames]
+
     def _extend(self, pointers: tuple[Pointer, ...]) -> None:
         try:
-            guides = self._guides
-            for stroke, _ in self._strokes:
-                assert guides is not None
-                guides = stroke.extend(guides, pointers)
-            assert guides is not None
-            self._batches.append(pointers)
-            if guides is not self._guides:
-                self._guides = guides
-                self.session.preview(self._document(guides))
+            before = self._guides
+            if self._bare and self._strokes[0][1].field is not None:
+                self._make_again()
+            self._apply(pointers)
+            if self._guides is not before:
+                assert self._guides is not None
+                self.session.preview(self._document(self._guides))
         except BaseException:
             self.cancel()
             raise
+
+    def _apply(self, pointers: tuple[Pointer, ...]) -> None:
+        guides = self._guides
+        for stroke, _ in self._strokes:
+            assert guides is not None
+            guides = stroke.extend(guides, pointers)
+        self._batches.append(pointers)
+        self._guides = guides
+
+    def _make_again(self) -> None:
+        """The stroke from its beginning, now that there is something to collide with."""
+        assert self._tool is not None
+        self._bare = False
+        grounds, batches = [ground for _, ground in self._strokes], self._batches
+        self._strokes = [(self._tool.begin(ground, batches[0][0]), ground) for ground in grounds]
+        self._guides, self._batches = grounds[0].guides, []
+        for batch in batches:
+            self._apply(batch)
 
     def _grounds(self, sight: Sight, tool: Tool[Any]) -> tuple[Ground, ...]:
         """What strokes would work on, one for each side of symmetry; the same objects while nothing changed."""
@@ -212,7 +260,7 @@ class Hand:
         item = mesh_to_edit(document, groom)
         key = (
             groom, item, workspace.frame, workspace.respect, sight.camera, sight.width, sight.height, document.unit,
-            tool.at_rest, tool.edits,
+            tool.at_rest, tool.edits, self.waits,
         )
         if self._ground is not None and all(a is b or a == b for a, b in zip(self._ground[0], key, strict=True)):
             return self._ground[1]
@@ -226,8 +274,7 @@ class Hand:
         grounds = tuple(
             Ground(
                 sight, View(side, sight.width, sight.height), item, frame, skin, rest, groom, guides, evaluator,
-                document.unit, tool.at_rest,
-                side is not matrix,
+                document.unit, tool.at_rest, side is not matrix, self.waits,
             )
             for side in sides
         )
@@ -252,7 +299,7 @@ class Hand:
 
     def _drop(self) -> None:
         self._tool, self._guides, self._record, self._back = None, None, None, None
-        self._strokes, self._batches = [], []
+        self._strokes, self._batches, self._bare = [], [], False
 
 
 def _ghost(tool: Tool[Any], ground: Ground, pointer: Pointer) -> Overlays:

@@ -28,7 +28,7 @@ from core.mesh.bvh import cast_rays
 from core.mesh.distance_field import DistanceField
 from core.mesh.skin import Skin
 from core.overlay import Overlays
-from core.posed import field_at
+from core.posed import field_at, field_known
 from core.record import Record
 from tools.pose import in_pose
 from tools.respect import Edits
@@ -80,6 +80,7 @@ class Ground:
     unit : of length, what numbers are shown in (core.document.METRES_PER_UNIT).
     at_rest : the tool works at rest, whatever pose is shown.
     mirrored : the other side of symmetry, for the few things a stroke does only once.
+    waits : see :attr:`field`.
     """
 
     sight: Sight
@@ -94,6 +95,7 @@ class Ground:
     unit: str = "m"
     at_rest: bool = False
     mirrored: bool = False
+    waits: bool = True
 
     @property
     def seed(self) -> int:
@@ -111,8 +113,13 @@ class Ground:
         return Screen(self.view, self.shown)
 
     @property
-    def field(self) -> DistanceField:
-        """What to collide with in the pose shown (made at the first asking)."""
+    def field(self) -> DistanceField | None:
+        """What to collide with in the pose shown, made at the first asking.
+
+        None while it is made elsewhere and nobody waits for it: the hand makes the stroke again when it is there.
+        """
+        if not self.waits and not field_known(self.item, self.frame, self.evaluator):
+            return None
         return field_at(self.item, self.frame, self.evaluator)
 
     @property

@@ -106,6 +106,7 @@ class Desk(QObject):
 
     def _listen(self, session: Session) -> None:
         session.changed = self.changed.emit
+        session.hand.waits = False
 
 
 FAILED = object()

@@ -231,6 +231,10 @@ class Viewport(QOpenGLWindow):
         picture = self.picture
         if picture is None or self._lent or self._busy() or self._stale or not self.isExposed():
             return
+        prepare = self.desk.session.hand.preparation()
+        if prepare is not None:  # so that the next press need not wait for it
+            self.desk.jobs.start(
+                "Preparing the skin for the hand", lambda progress, cancelled: prepare(), lambda found: None)
         self.makeCurrent()
         more = picture.rest(self.eye.camera)
         if picture.view.picture_changed:

@@ -60,6 +60,11 @@ def distance_field(mesh: Mesh, evaluator: Evaluator) -> DistanceField:
     return evaluator.get(_field, mesh, workers=evaluator.workers)
 
 
+def distance_field_known(mesh: Mesh, evaluator: Evaluator) -> bool:
+    """True when :func:`distance_field` would answer at once."""
+    return evaluator.knows(_field, mesh, workers=evaluator.workers)
+
+
 def signed_skin(mesh: Mesh, evaluator: Evaluator) -> SignedSkin:
     """Exact signed distances to the mesh at rest, remembered by the evaluator."""
     return evaluator.get(_signed, mesh)

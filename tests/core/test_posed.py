@@ -7,7 +7,7 @@ from core.document import MeshObject
 from core.evaluator import Evaluator
 from core.mesh.distance_field import sample_points
 from core.pose.skinning import posed_points
-from core.posed import field_at, skin_at
+from core.posed import field_at, field_known, skin_at
 
 
 def test_a_frame_is_posed_once_and_rest_is_rest() -> None:
@@ -34,4 +34,9 @@ def test_the_field_stands_where_the_skin_stands() -> None:
     outside = (skin.points + 0.004 * skin.normals).astype(np.float32)
     distances = sample_points(field, outside)
     assert np.median(np.abs(distances - 0.004)) < 0.001
+    assert field_known(item, 1014, evaluator)
+    assert not field_known(item, 1015, evaluator)
+    assert not field_known(item, None, evaluator)
+    field_at(item, None, evaluator)
+    assert field_known(item, None, evaluator)
     evaluator.close()

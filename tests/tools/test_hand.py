@@ -1,14 +1,17 @@
 """The hand: what a press, a drag, a release, Esc, an error and a pose make of a document."""
 
+import time
+
 import numpy as np
 import pytest
 
 from core.document import Document
 from core.errors import UserError
+from core.evaluator import Evaluator
 from core.groom.guides import Guides
 from core.groom.rows import take_rows
 from core.leaves import same_bits
-from core.posed import skin_at
+from core.posed import field_known, skin_at
 from core.record import Record, freeze
 from core.workspace import Respect, Workspace
 from tests.core.groom.small_grooms import segment_lengths
@@ -397,3 +400,62 @@ def test_replaying_gives_the_same_bits():
         second.hand.replay(record)
     assert len(records) == 4
     assert same_bits(first.document.grooms, second.document.grooms)
+
+
+@pytest.mark.parametrize("name", ["comb", "smooth", "cut", "select"])
+@pytest.mark.parametrize("when", ["before", "amid", "at release", "by itself"])
+def test_a_hand_that_does_not_wait_for_the_skin_makes_the_same_document(name, when):
+    def fresh(waits):
+        s = Session(document(), Workspace(frame=BENT), evaluator=Evaluator())
+        s.hand.waits = waits
+        s.choose(name)
+        return s
+
+    patient, s = fresh(True), fresh(False)
+    way = line((200, 130), (215, 240), 14)
+    patient.hand.stroke(sight(), way)
+    item = s.document.meshes[0]
+    if when != "by itself":  # then the hand has it made on a thread of its own
+        work = s.hand.preparation()
+        assert s.hand.preparation() is None, "it is handed out once"
+    if when == "before":
+        work()
+    s.hand.press(sight(), way[0])
+    shapes = s.tool.edits == "shape"
+    assert s.hand._bare == (shapes and when != "before") or when == "by itself"
+    for number, pointer in enumerate(way[1:]):
+        if number == 6 and when == "amid":
+            work()
+        if number == 6 and when == "by itself" and shapes:
+            end = time.monotonic() + 60.0
+            while not field_known(item, BENT, s.evaluator):
+                assert time.monotonic() < end
+                time.sleep(0.005)
+        s.hand.move((pointer,))
+        if when in ("amid", "by itself") and number >= 6:
+            assert not s.hand._bare
+    s.hand.release()
+    for column in ("points", "hold", "selected", "ids"):
+        np.testing.assert_array_equal(getattr(guides_of(s), column), getattr(guides_of(patient), column))
+    if shapes:
+        assert s.history.names == patient.history.names == ("New", s.tool.step)
+    for one in (s, patient):
+        one.close(discard=True)
+
+
+def test_a_stroke_goes_through_the_skin_only_until_it_is_there():
+    s = Session(document(), Workspace(frame=BENT), evaluator=Evaluator())
+    s.hand.waits = False
+    work = s.hand.preparation()
+    s.choose("comb", strength=1.0, size=60.0)
+    way = line((200, 120), (200, 280), 10)
+    s.hand.press(sight(), way[0])
+    s.hand.move(way[1:])
+    bare = guides_of(s).points
+    work()
+    assert s.hand.preparation() is None
+    s.hand.move((way[-1]._replace(x=way[-1].x + 1.0),))
+    assert (np.abs(guides_of(s).points - bare).max(axis=(1, 2)) > 1e-3).sum() > 3
+    s.hand.cancel()
+    assert s.document is s.history.current
+    s.close(discard=True)
