@@ -127,7 +127,8 @@ def _camera(name: str, world: Array, lens: Array, metres: float, up: str) -> Fil
 
 def _gltf_cameras(path: Path) -> dict[str, Any]:
     gltf, _ = open_gltf(path)
-    names, world, lens = [], [], []
+    names: list[str] = []
+    world, lens = [], []
     try:
         placed = placed_nodes(path, gltf)
         for row, matrix in placed:

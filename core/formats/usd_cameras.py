@@ -27,7 +27,8 @@ def read_in_child(path: str, frame: float) -> dict[str, Any]:
         stage = None
     if stage is None:
         raise UserError(f"{name} is not a USD file that can be read; export it again.")
-    names, world, lens = [], [], []
+    names: list[str] = []
+    world, lens = [], []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdGeom.Camera) or len(names) == MOST:
             continue
