@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QProcess
+from PySide6.QtCore import QPoint, QProcess, Qt
+from PySide6.QtWidgets import QMenu
 
 from app.deliver import deliver
 from app.window.opening import MESH_SUFFIXES, PICTURE_SUFFIXES, choose_file, filter_of
@@ -16,10 +17,12 @@ from app.window.screenshot import view_image
 from core.document import find_mesh
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.formats import curve_file
+from core.formats import camera_file, curve_file
+from core.formats.camera_file import FileCamera, read_cameras
 from core.formats.mesh_file import MeshFile, read_mesh
 from core.formats.project import write_project
 from core.groom.grow import grow
+from core.navigate import whole_in
 from core.workspace import Reference
 from tools.document_edits import replace_mesh
 from tools.macro import play
@@ -137,6 +140,35 @@ class FileActions:
         offset = 0.03 * (len(view.references) % 8)
         pinned = Reference(path=str(path), x=0.02 + offset, y=0.2 + offset)
         self._desk.set_workspace(view=view.replace(references=(*view.references, pinned)))
+
+    def camera_from_file(self, path: Path | None = None) -> None:
+        """Look through a camera of a shot at the current frame; asks which when there are several."""
+        if path is None:
+            filters = [filter_of("Cameras", camera_file.READ_SUFFIXES)]
+            self._choose("Camera from a file", filters, self.camera_from_file)
+            return
+        document, frame = self._desk.document, self._desk.workspace.frame
+
+        def done(found: tuple[FileCamera, ...]) -> None:
+            if len(found) == 1:
+                self._look_through(found[0])
+                return
+            menu = QMenu(self._window)
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            for one in found:
+                menu.addAction(one.name.replace("&", "&&")).triggered.connect(
+                    lambda checked=False, one=one: self._look_through(one))
+            menu.popup(self._window.view.mapToGlobal(QPoint(8, 8)))
+
+        self._desk.jobs.start(
+            f"Read {path.name}", lambda progress, cancelled: read_cameras(path, frame, document.fps, cancel=cancelled),
+            done)
+
+    def _look_through(self, found: FileCamera) -> None:
+        width, height = self._window.viewport.pixels()
+        self._window.look(whole_in(found.camera, found.aspect, width / height))
+        shift = " Its picture is shifted aside in the file; here it is centred." if found.off_centre else ""
+        self._desk.said.emit(f"This is what {found.name} sees at frame {self._desk.workspace.frame:g}.{shift}")
 
     def save_macro(self, path: Path | None = None) -> None:
         """End the recording and write it."""

@@ -178,6 +178,7 @@ class MainWindow(QMainWindow):
             files.save_screenshot, files.save_macro, files.play_macro)
         self.choose_background, self.pin_reference = files.choose_background, files.pin_reference
         self.restart_safe, self.import_mesh = files.restart_safe, opening.ask_import
+        self.camera_from_file = files.camera_from_file
 
     def make_session(self, document: Document | None = None, *args: Any, **settings: Any) -> Session:
         """A session for this window: with a journal, so that a crash loses nothing, and with its tools."""
@@ -242,6 +243,13 @@ class MainWindow(QMainWindow):
     def toggle_playback(self) -> None:
         """Play or stop."""
         self.timeline.playback.toggle()
+
+    def toggle_floating_view(self) -> None:
+        """The viewport in a window of its own, or back."""
+        if self.view.floating:
+            self.view.dock()
+        else:
+            self.view.float_out()
 
     def toggle_panel(self, name: str) -> None:
         """Show or hide a panel."""
@@ -366,8 +374,6 @@ class MainWindow(QMainWindow):
 
     def _show_middle(self) -> None:
         self.middle.setCurrentWidget(self.view if self.desk.document.meshes else self.doors)
-        # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
-        self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
         # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
         self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
         self.status.show_hint()

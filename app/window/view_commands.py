@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.window.commands import Command, Window, is_on, switch
-from tools.document_edits import set_mesh_hidden
+from tools.document_edits import set_document, set_mesh_hidden
 from tools.scene import active_mesh, anything_hidden, ghosted, isolated, show_all, stored_bookmark
 
 if TYPE_CHECKING:
@@ -151,6 +151,11 @@ VIEW: tuple[Command, ...] = (
         lambda w: w.toggle_projection(), "core.navigate.with_projection", scope="viewport", icon="perspective",
         words="ortho parallel lens",
         checked=lambda desk: bool(desk.session.workspace.cameras) and desk.session.workspace.cameras[0].orthographic),
+    Command(
+        "view.camera_from_file", "Camera from a file…",
+        "Looks through a camera of USD, Alembic or glTF at this frame; all of its picture is seen.",
+        lambda w: w.camera_from_file(), "core.formats.camera_file.read_cameras", enabled=_needs_something,
+        icon="camera", words="shot match import lens layout"),
     *(
         Command(
             f"view.store_{n}", f"Keep view {n}", f"Keeps how you look now as view {n}, saved with the project.",
@@ -224,6 +229,16 @@ VIEW: tuple[Command, ...] = (
         words="density down faster"),
 )
 
+def _begin_here(window: Window) -> None:
+    document, frame = window.desk.session.document, round(window.desk.session.workspace.frame)
+    window.desk.edit("Frame range", set_document, first_frame=frame, last_frame=max(frame, document.last_frame))
+
+
+def _end_here(window: Window) -> None:
+    document, frame = window.desk.session.document, round(window.desk.session.workspace.frame)
+    window.desk.edit("Frame range", set_document, first_frame=min(frame, document.first_frame), last_frame=frame)
+
+
 FRAME: tuple[Command, ...] = (
     Command(
         "frame.play", "Play / pause", "Plays the frames of the timeline in a loop, at the project's rate.",
@@ -243,4 +258,12 @@ FRAME: tuple[Command, ...] = (
         "frame.last", "Last frame", "Goes to the last frame of the timeline, where playback ends.",
         lambda w: w.desk.set_workspace(frame=float(w.desk.session.document.last_frame)), _WORKSPACE, icon="last",
         scope="viewport", words="end time"),
+    Command(
+        "frame.begin_here", "Begin the range here", "Makes this frame the first one that the timeline plays.",
+        _begin_here, "tools.document_edits.set_document", "document", "Frame range", icon="first", scope="viewport",
+        words="in point start playback crop"),
+    Command(
+        "frame.end_here", "End the range here", "Makes this frame the last one that the timeline plays.",
+        _end_here, "tools.document_edits.set_document", "document", "Frame range", icon="last", scope="viewport",
+        words="out point stop playback crop"),
 )

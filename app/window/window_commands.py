@@ -82,6 +82,11 @@ WINDOW: tuple[Command, ...] = (
         "window.reset_layout", "Reset the layout", "Puts every panel back where it is in a new installation.",
         lambda w: w.reset_layout(), _WORKSPACE, icon="reset", words="panels docks default"),
     Command(
+        "window.float_view", "Float / dock the view",
+        "Puts the view into a window of its own, for a second screen; again brings it back.",
+        lambda w: w.toggle_floating_view(), _WORKSPACE, "window", icon="panel",
+        words="detach second monitor screen"),
+    Command(
         "window.full_screen", "Full screen", "Fills the whole screen with the window; again brings the frame back.",
         lambda w: w.toggle_full_screen(), _WORKSPACE, "window", icon="fullscreen", words="maximize"),
     Command(
