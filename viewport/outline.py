@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from viewport.kept import same
 from viewport.scene import Scene, all_points
 
-DIRECTIONS = 96  # over half a sphere: none is more than 0.15 radians from one of them or its opposite
-POINTS_AT_ONCE = 1 << 14
+DIRECTIONS = 80  # over half a sphere: none is more than 0.25 radians from one of them or its opposite
+POINTS_AT_ONCE = 1 << 12  # that stay in the cache
 
 
 def _half_sphere(count: int) -> NDArray[np.float32]:
@@ -26,16 +26,18 @@ _SPREAD = np.concatenate([np.eye(3, dtype=np.float32), _half_sphere(DIRECTIONS)]
 def outline_points(scene: Scene) -> NDArray[np.float32]:
     """(M, 3): the outermost points of :func:`viewport.scene.all_points` along even directions; none of an empty scene.
 
-    Along the axes of the world they bound the scene exactly; along any other direction to a hundredth of its size.
+    Along the axes of the world they bound the scene exactly; along any other direction to a fiftieth of its size.
     """
     arrays = [np.asarray(points, np.float32) for points in all_points(scene) if len(points)]
     if not arrays:
         return np.zeros((0, 3), np.float32)
     found = []
     points = np.concatenate(arrays)
+    across = np.ptp(points, axis=0)
+    spread = _SPREAD / np.maximum(across, 1e-6 * max(float(across.max()), 1e-30))  # as even for flat and long scenes
     for start in range(0, len(points), POINTS_AT_ONCE):
         part = points[start : start + POINTS_AT_ONCE]
-        along = _SPREAD @ part.T
+        along = spread @ part.T
         found.append(part[np.unique(np.concatenate([along.argmin(axis=1), along.argmax(axis=1)]))])
     return np.concatenate(found)
 

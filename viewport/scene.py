@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 Color = tuple[float, float, float]
-MOST_BOUNDING = 5_000  # strands looked at to find how large the scene is
+MOST_BOUNDING, ALONG = 5_000, 5  # strands, and points of each, looked at to find how large the scene is
 Floats = NDArray[np.float32]
 
 
@@ -167,12 +167,12 @@ def root_normals(points: np.ndarray, surface: Surface) -> Floats:
 
 
 def all_points(scene: Scene) -> list[np.ndarray]:
-    """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (of many, every few)."""
+    """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (some of many)."""
     found = [surface.points for surface in scene.surfaces]
     for points in [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]:
         axis = 2 if points.shape[1] == 3 else 1
         points = points[:: 1 + len(points) // MOST_BOUNDING]
-        for at in range(points.shape[axis]):
+        for at in np.unique(np.linspace(0, points.shape[axis] - 1, ALONG).astype(np.intp)):
             found.append(points.take(at, axis=axis))
     return found
 
