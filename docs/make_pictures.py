@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from app.commands.demo import draw_poses
 from app.deliver import draw
 from app.files import draw_file
 from core.demo.document import demo_document
+from core.demo.pose_document import pose_document
 from core.document import Document, MeshObject
 from core.evaluator import Evaluator
 from core.formats.mesh_file import read_mesh
@@ -18,14 +21,40 @@ from core.formats.project import write_project
 from core.groom.dress import dress
 from core.groom.grow import grow
 from core.groom.style import load_style
+from core.mesh.skin import skin_posed
+from core.pose.pose import REST
+from core.pose.synthesis import evaluate
+from tests.display import ensure_display
 
 PICTURES = Path(__file__).parent / "pictures"
 CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's meshes, CC BY 4.0
 STYLES = ("short", "fur", "long", "mane")
 
 
+def first_groom() -> None:
+    """Follow the first groom by hand in the real window; a picture of the window after every step."""
+    ensure_display()  # before anything of Qt is made
+    from app.window.screenshot import window_image
+    from docs.first_groom import SIZE, STEPS, picture_of
+    from docs.manual import written
+    from tests.window.alone import hand_at
+    from tests.window.take_pictures import reduced
+
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
+        hand = hand_at(None, SIZE)
+        for number, step in enumerate(STEPS, 1):
+            step.do(hand, Path(folder))
+            image = reduced(window_image(hand.window), 0.75)
+            cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        hand.window.close_unasked()
+    manual = PICTURES.parent / "groom.md"
+    manual.write_text(written(manual.read_text("utf-8")), "utf-8")
+
+
 def main() -> None:
     PICTURES.mkdir(exist_ok=True)
+    first_groom()
     evaluator = Evaluator()
     document = demo_document(evaluator)
     children = {1: grow(document.grooms[0], document.meshes[0].mesh, evaluator)}
@@ -34,6 +63,7 @@ def main() -> None:
     write_project(turned, document)
     draw_file(turned, PICTURES / "demo-1024.png", (1200, 750), "three-quarter", 1024, print)
     turned.unlink()
+    pose_pictures(evaluator)
     data = os.environ.get("FILOPLUME_DATA")
     if not data:
         print("FILOPLUME_DATA is not set: the pictures of the cat stay as they are")
@@ -50,6 +80,31 @@ def main() -> None:
             path.unlink()
     small = [cv2.resize(image, None, fx=0.62, fy=0.62, interpolation=cv2.INTER_AREA) for image in made]
     cv2.imwrite(str(PICTURES / "styles.png"), np.hstack(small))
+
+
+def pose_pictures(evaluator: Evaluator) -> None:
+    """The arm with and without its sculpts, and the face at rest and at its four expressions."""
+    document = pose_document()
+    limb, head = document.meshes
+    rows = []
+    for names, item, corrected in (
+        (("elbow bent", "forearm twisted", "shoulder raised"), limb, False),
+        (("elbow bent", "forearm twisted", "shoulder raised"), limb, True),
+        (("rest", "joy", "calm", "sadness", "anger"), head, True),
+    ):
+        poses = {s.name: s.pose for layer in item.correctives.layers for s in layer.space.samples}
+        correctives = item.correctives if corrected else None
+        row = []
+        for name in names:
+            points = evaluate(item.mesh.points, item.rig, correctives, poses.get(name, REST))
+            size = (500, 420) if item is limb else (300, 340)
+            path = PICTURES / "one.png"
+            draw_poses(path, Document(meshes=(item,)), {item.id: skin_posed(item.mesh, points, evaluator)}, size)
+            row.append(cv2.imread(str(path)))
+            path.unlink()
+        rows.append(np.hstack(row))
+    cv2.imwrite(str(PICTURES / "arm-poses.png"), np.vstack(rows[:2]))
+    cv2.imwrite(str(PICTURES / "face-poses.png"), rows[2])
 
 
 if __name__ == "__main__":
