@@ -17,6 +17,7 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.window.garbage import Garbage
+from app.window.memory import keep_freed_memory
 from app.window.settings import LoadedSettings, load_settings
 from app.window.theme import apply, load_theme, look_of
 from core.errors import UserError
@@ -67,6 +68,7 @@ def run(wish: Wish) -> int:
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
     ):
         raise UserError(NO_DISPLAY)
+    keep_freed_memory()
     qInstallMessageHandler(_qt_says)
     # every sample of mouse and pen is wanted: they are gathered for each picture, not thrown away
     QApplication.setAttribute(Qt.ApplicationAttribute.AA_CompressHighFrequencyEvents, False)
