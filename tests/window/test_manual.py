@@ -57,9 +57,7 @@ def bends(points: np.ndarray) -> float:
 
 
 @pytest.mark.timeout(400)
-def test_the_first_groom_followed_literally_makes_its_picture(
-    home: Path, collected_here: None, qapp: object
-) -> None:
+def test_the_first_groom_followed_literally_makes_its_picture(home: Path, qapp: object) -> None:
     if OFFSCREEN is not None:
         pytest.skip(OFFSCREEN)
     hand = hand_at(None, SIZE)
