@@ -2,27 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from app.commands import groom as groom_command
-from app.deliver import deliver, draw
+from app.deliver import deliver, draw, posed_document
 from app.report import Report
+from core.camera import frame_points
 from core.demo import demo_document
+from core.demo.pose_document import pose_document
+from core.document import Document
 from core.evaluator import Evaluator
+from core.formats.project import write_project
 from core.groom.grow import grow
+from core.mesh.skin import Skin
+
+POSE_FRAMES = (1001, 1017, 1045, 1065)
 
 
 def command(
+    what: Annotated[str | None, typer.Argument(help="pose for the demo of pose space; without a word, the groomed animal.", show_default=False)] = None,
     mesh: Annotated[Path | None, typer.Option(help="Another animal than the demo's.")] = None,
     folder: Annotated[Path, typer.Option(help="Where the files go.")] = Path("out"),
     hairs: Annotated[int, typer.Option(min=0, max=20_000_000, help="Hairs to grow.")] = 120_000,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Groom the demo animal and write demo.filo, demo.usdc and demo.png."""
+    """Write the demo: a groomed animal (demo.filo, .usdc, .png), or with pose an arm and a face (pose.filo, .png)."""
+    if what not in (None, "pose"):
+        raise typer.BadParameter(f"there is no demo {what}; say pose, or nothing for the animal")
     folder.mkdir(parents=True, exist_ok=True)
+    if what == "pose":
+        _pose(folder, as_json)
+        return
     files = [folder / "demo.filo", folder / "demo.usdc"]
     if mesh is not None:
         groom_command.command(mesh, files, hairs=hairs, png=folder / "demo.png", as_json=as_json)
@@ -39,3 +54,32 @@ def command(
             draw(folder / "demo.png", document, children, evaluator)
     outputs = [*map(str, files), str(folder / "demo.png")]
     report.done({"outputs": outputs, "seconds": report.seconds}, ["the demo animal has its coat:", *outputs])
+
+
+def draw_poses(path: Path, document: Document, skins: Mapping[int, Skin], size: tuple[int, int] = (1600, 1000)) -> None:
+    """Draw the meshes of `skins` from the front, a little from above."""
+    from viewport.document_scene import scene_of
+    from viewport.picture import render_png
+
+    points = np.concatenate([skin.points for skin in skins.values()])
+    camera = frame_points(points, (-0.12, -0.12, -1.0), size[0] / size[1])
+    render_png(path, scene_of(document, skins, {}), camera, size)
+
+
+def _pose(folder: Path, as_json: bool) -> None:
+    report, evaluator = Report(as_json), Evaluator()
+    project, pictures = folder / "pose.filo", [(folder / f"pose-{frame}.png", frame) for frame in POSE_FRAMES]
+    with report.working(total=6):
+        document = pose_document(stage=report.stage)
+        with report.stage("export_filo", f"writing {project}"):
+            write_project(project, document)
+        for path, frame in pictures:
+            with report.stage("export_picture", f"drawing {path.name}"):
+                draw_poses(path, document, posed_document(document, frame, evaluator))
+    outputs = [str(project), *(str(path) for path, _ in pictures)]
+    poses = [s.name for item in document.meshes if item.correctives is not None
+             for layer in item.correctives.layers for s in layer.space.samples]
+    report.done(
+        {"poses": poses, "outputs": outputs, "seconds": report.seconds},
+        [f"an arm and a face with the poses {', '.join(poses)}:", *outputs],
+    )

@@ -193,8 +193,8 @@ def _finger(cage: _Cage, base: list[int], length: float, fan: float, island: str
     rim = np.array([cage.points[i] for i in base])
     middle = rim.mean(axis=0)
     loops, place, direction = [base], middle.copy(), normalized(np.array([1.0, fan, 0.0]))
-    for step, size, curl in ((0.10, 0.84, 0.0), (0.32, 0.82, 6.0), (0.30, 0.76, 16.0), (0.22, 0.66, 16.0),
-                             (0.06, 0.36, 6.0)):
+    for step, size, curl in ((0.10, 1.02, 0.0), (0.32, 1.02, 6.0), (0.30, 0.95, 18.0), (0.22, 0.84, 18.0),
+                             (0.06, 0.46, 6.0)):
         c, s = np.cos(np.radians(curl)), np.sin(np.radians(curl))
         direction = np.array([c * direction[0] - s * direction[2], direction[1], s * direction[0] + c * direction[2]])
         place = place + step * length * direction
@@ -214,8 +214,8 @@ def _thumb(cage: _Cage, near: list[int], far: list[int]) -> None:
     loops = [base]
     place, direction = middle, normalized(np.array([0.50, 0.80, 0.30]))
     ends = np.array([(-1.0, -0.8), (-1.05, 0.0), (-1.0, 0.8), (1.0, 0.8), (1.05, 0.0), (1.0, -0.8)])
-    for step, width, turn in ((0.012, 0.0150, 0.0), (0.022, 0.0125, 0.25), (0.020, 0.0120, 0.30), (0.017, 0.0105, 0.3),
-                              (0.006, 0.0060, 0.0)):
+    for step, width, turn in ((0.012, 0.0175, 0.0), (0.022, 0.0148, 0.25), (0.020, 0.0140, 0.30), (0.017, 0.0125, 0.3),
+                              (0.006, 0.0070, 0.0)):
         direction = normalized(direction + np.array([turn, 0.0, 0.0]))
         place = place + step * direction
         side = normalized(np.cross(direction, np.array([0.0, 0.0, 1.0])))

@@ -222,9 +222,9 @@ def write_maya(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:
         if part == "number":
             reads.setdefault(control, []).append(f"float ${name} = filoplume.{joint};")
         elif part.startswith("t"):
-            axis = "xyz".index(part[1])
+            rest = _n(places[control]["xyz".index(part[1])])
             reads.setdefault(control, []).append(
-                f"float ${name} = {joint}.translate{part[1].upper()} * 0.01 - {_n(places[control][axis])};")
+                f"float ${name} = {joint}.translate{part[1].upper()} * 0.01 - {rest};")
         else:
             reads.setdefault(f"{control} ", []).append(f"float ${name} = {_EULER[part]};")
     lines: list[str] = []

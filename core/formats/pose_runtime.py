@@ -21,7 +21,7 @@ from core.formats.atomic import atomic_write
 from core.pose.pose_space import Kernel
 from core.pose.synthesis import Prepared, prepare
 
-FORMAT = "filoplume-runtime"
+FORMAT: Literal["filoplume-runtime"] = "filoplume-runtime"
 VERSION = 1
 LARGEST_JSON, LARGEST_ARRAYS = 64 << 20, 4 << 30  # bytes
 DAMAGE = (ValueError, KeyError, IndexError, OverflowError, EOFError, zipfile.BadZipFile, NotImplementedError)
@@ -253,7 +253,8 @@ def _check(head: RuntimeHead, arrays: dict[str, NDArray[Any]]) -> None:
         must(not values.size or (values.min() >= least and values.max() < count), f"{name} reaches outside")
 
     must(all(len(arrays[n]) == joints for n in ("parents", "rest", "inverse_bind")), "joints are missing")
-    must((arrays["parents"] < np.arange(joints)).all() and (arrays["parents"] >= -1).all(), "parents come later")
+    parents = arrays["parents"]
+    must(bool(((parents < np.arange(joints)) & (parents >= -1)).all()), "parents come later")
     must(arrays["joints"].shape == arrays["weights"].shape, "weights are missing")
     must(len(arrays["joints"]) == vertices, "the skin does not fit")
     within("joints", joints)

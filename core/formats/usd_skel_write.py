@@ -68,7 +68,8 @@ def joint_tokens(rig: Rig) -> list[str]:
     from pxr import Tf
 
     taken: set[str] = set()
-    names, out = [], []
+    names: list[str] = []
+    out: list[str] = []
     for name in rig.skeleton.names or (STILL,):
         valid = Tf.MakeValidIdentifier(name)
         free = next(n for n in (valid, *(f"{valid}_{i}" for i in range(2, len(taken) + 3))) if n not in taken)
