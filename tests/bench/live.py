@@ -156,7 +156,8 @@ def _numbers(hand: Hand) -> list[Row]:
 
     rows = [
         Row("a colour is changed", median(lambda: coat(color_tip=lambda s: (0.01 * s, 0.2, 0.1))), "ms", 5),
-        Row("the density is changed", median(lambda: coat(density=lambda s: constant(1.0 - 0.01 * (s % 50)))), "ms", 12),
+        Row("the density is changed", median(lambda: coat(density=lambda s: constant(1.0 - 0.01 * (s % 50)))),
+            "ms", 12),
         Row("clump is changed", median(lambda: coat(clump=lambda s: constant(0.01 * (s % 50)))), "ms", 12),
         Row("a dab on the length map", median(lambda: paint), "ms", 25),
     ]

@@ -16,7 +16,7 @@ from core.formats.recovery import recover_newest
 from core.leaves import same_bits
 
 sys.path.insert(0, os.path.dirname(__file__))
-from crash_child import number_of, state
+from tests.core.formats.crash_child import number_of, state
 
 CHILD = Path(__file__).with_name("crash_child.py")
 

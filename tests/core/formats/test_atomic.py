@@ -9,10 +9,10 @@ import sys
 import textwrap
 
 import pytest
-from failing_disk import Disk, failing
 
 from core.errors import UserError
 from core.formats.atomic import atomic_write
+from tests.core.formats.failing_disk import Disk, failing
 
 OLD, NEW = b"the old file" * 1000, b"the new one!" * 2000
 

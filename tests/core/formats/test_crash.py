@@ -1,7 +1,8 @@
 """kill -9 at random moments of saving and autosaving. Ten thousand of each are in tests/soak."""
 
 import pytest
-from crash import Crasher, kill_journals, kill_saves
+
+from tests.core.formats.crash import Crasher, kill_journals, kill_saves
 
 
 @pytest.fixture

@@ -8,11 +8,11 @@ import zlib
 import msgspec
 import numpy as np
 import pytest
-from hostile_parts import DOCUMENT, ENCODED, POINTS, TREE, npy
 
 from core.formats.journal import COMMIT, DELTA, DELTA_HEADER, OBJECT, record
 from core.formats.recovery import check_journal, recover_files
 from core.leaves import same_bits
+from tests.core.formats.hostile_parts import DOCUMENT, ENCODED, POINTS, TREE, npy
 
 
 def commit(tree=None, arrays=None, **about):

@@ -9,7 +9,12 @@ import zipfile
 
 import numpy as np
 import pytest
-from hostile_parts import (
+
+from core.errors import UserError
+from core.formats.project import check_project, read_project, write_project
+from core.leaves import same_bits
+from core.workspace import Workspace
+from tests.core.formats.hostile_parts import (
     DOCUMENT,
     ENCODED,
     POINTS,
@@ -26,11 +31,6 @@ from hostile_parts import (
     with_array,
     with_member,
 )
-
-from core.errors import UserError
-from core.formats.project import check_project, read_project, write_project
-from core.leaves import same_bits
-from core.workspace import Workspace
 from tests.documents import small_document
 
 GROOM = ("grooms", 0)

@@ -8,7 +8,6 @@ import time
 import msgspec
 import numpy as np
 import pytest
-from failing_disk import Disk, failing
 
 from core.document import Document, with_groom
 from core.formats.arrays import ArrayHashes
@@ -27,6 +26,7 @@ from core.formats.journal import (
 from core.formats.recovery import abandoned, check_journal, recover, recover_files, recover_newest
 from core.leaves import same_bits
 from core.workspace import Workspace
+from tests.core.formats.failing_disk import Disk, failing
 from tests.documents import small_document, small_workspace, stroked
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from failing_disk import Disk, failing
 
 from core.document import Document, with_groom
 from core.errors import UserError
@@ -24,6 +23,7 @@ from core.pose.skeleton import Clip, Skeleton, SkinWeights
 from core.record import freeze, is_frozen
 from core.value import formula
 from core.workspace import Workspace
+from tests.core.formats.failing_disk import Disk, failing
 from tests.documents import small_document, small_workspace, stroked
 
 BASELINES = Path(__file__).parents[3] / "resources" / "baselines"
