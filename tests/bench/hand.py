@@ -7,6 +7,7 @@ import time
 import numpy as np
 
 import tools.groom.comb as comb_tool
+from app.window.memory import keep_freed_memory
 from core.camera import frame_points
 from core.demo import demo_document
 from core.evaluator import Evaluator
@@ -20,6 +21,7 @@ WAY = tuple(Pointer(600.0 + 8.0 * i, 450.0 + 3.0 * i, time=0.01 * i) for i in ra
 
 
 def run() -> list[Row]:
+    keep_freed_memory()  # as the window does
     evaluator = Evaluator()
     document = demo_document(evaluator, hairs=1000, guides=GUIDES)
     sight = Sight(frame_points(document.meshes[0].mesh.points, aspect=1.6), 1600, 1000)
