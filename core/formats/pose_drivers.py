@@ -298,10 +298,10 @@ def main():
     armature = mesh.find_armature()
     frames = frames_of(armature)
     if mesh.data.shape_keys is None:
-        mesh.shape_key_add(name="Basis")
+        mesh.shape_key_add(name="Basis", from_mix=False)
     keys = mesh.data.shape_keys.key_blocks
     for name, vertices, moves in SHAPES:
-        key = keys.get(name) or mesh.shape_key_add(name=name)
+        key = keys.get(name) or mesh.shape_key_add(name=name, from_mix=False)
         key.slider_min, key.slider_max = -10.0, 10.0
         for vertex, move in zip(vertices, moves):
             key.data[vertex].co = keys[0].data[vertex].co + frames[""] @ Vector(move)
