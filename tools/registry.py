@@ -93,6 +93,8 @@ def _check(kind: type[Tool[Any]]) -> None:
     for word in ("name", "label", "icon", "tooltip", "hint", "step"):
         if not isinstance(getattr(kind, word, None), str) or not getattr(kind, word):
             raise ValueError(f"the tool {kind.__name__} needs a {word}")
+    if not isinstance(getattr(kind, "order", None), int):
+        raise ValueError(f"the tool {kind.__name__} needs an order, a whole number that places it on the shelf")
     if len(kind.tooltip.split()) < 8:
         raise ValueError(f"the tooltip of {kind.name} says too little")
     fields_of(kind.Params)

@@ -37,6 +37,7 @@ from app.window.opening import Opening
 from app.window.outliner import Outliner
 from app.window.palette import Palette
 from app.window.playblast import PlayblastDialog
+from app.window.plugin_bar import PluginBar
 from app.window.preferences import Preferences
 from app.window.recovery_bar import RecoveryBar
 from app.window.screenshot import Photographer
@@ -90,6 +91,7 @@ class MainWindow(QMainWindow):
         self.middle = QStackedWidget()
         self.recovery = RecoveryBar(self.desk)
         self.crash = CrashBar(self.crash_watch)
+        self.plugins = PluginBar(session.tools.troubles)
         self.status = StatusLine(self.desk, self.hotkeys)
         self.timeline = Timeline(self.desk)
         self.panels: dict[str, QWidget] = {"shelf": self.shelf, "timeline": self.timeline}
@@ -107,9 +109,8 @@ class MainWindow(QMainWindow):
         self.timeline.playback.changed.connect(self._playback_changed)
         self.viewport.failed.connect(self.view.show_trouble)
         self.viewport.settled.connect(self._show_cached)
-        for trouble in (loaded.trouble, *(f"{t.file}: {t.reason}" for t in session.tools.troubles)):
-            if trouble:
-                self.desk.error(UserError(trouble))
+        if loaded.trouble:
+            self.desk.error(UserError(loaded.trouble))
         self._take_session()
 
     # -- how it is put together --------------------------------------------------------------------------
@@ -148,7 +149,7 @@ class MainWindow(QMainWindow):
         down = QVBoxLayout(whole)
         down.setContentsMargins(0, 0, 0, 0)
         down.setSpacing(0)
-        for bar in (self.top, self.recovery, self.crash):
+        for bar in (self.top, self.recovery, self.crash, self.plugins):
             down.addWidget(bar)
         down.addLayout(across, 1)
         down.addWidget(self.timeline)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -162,7 +163,11 @@ class StartFrame(QWidget):
             return
         self._child = None
         wish = self._wish._replace(demo=self._wish.demo or self.choice.isChecked())
-        window = open_window(wish, self._loaded)
+        try:
+            window = open_window(wish, self._loaded)
+        except Exception as error:  # a window that cannot be made must not leave this one waiting for ever
+            self._give_up(error)
+            return
         self.window_made = window
         if wish.screenshot is not None:
             from app.window.screenshot import Photographer
@@ -171,6 +176,12 @@ class StartFrame(QWidget):
         elif wish.after is not None:
             self._after(window, wish.after)
         self.hide()
+
+    def _give_up(self, error: Exception) -> None:
+        self.failed = f"The window could not be opened ({type(error).__name__}: {error})."
+        if not isinstance(error, UserError):
+            os.write(2, traceback.format_exc().encode())
+        self.close()
 
     def _after(self, window: MainWindow, script: Path) -> None:
         from app.window.screenshot import run_script
