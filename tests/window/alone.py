@@ -30,12 +30,21 @@ def application() -> QApplication:
 
 def hand_at(
     document: Document | None, size: tuple[int, int], settings: Settings | None = None, folder: Path | None = None,
+    managed: bool = True,
 ) -> Hand:
-    """A hand at a window of its own. `size` : of the window. `folder` : of preferences; None for the usual one."""
+    """A hand at a window of its own.
+
+    Parameters
+    ----------
+    size : of the window. folder : of preferences; None for the usual one. managed : False keeps window managers off,
+        which change sizes at broken scales; such a window has no keyboard.
+    """
     settings = settings or Settings()
     qt_api.set_qt_api("pyside6")
     apply(application(), load_theme(settings.theme), settings.text_size)
     window = MainWindow(Session(document, fresh_workspace(), journal=Journal()), settings, folder)
+    if not managed:
+        window.setWindowFlag(Qt.WindowType.X11BypassWindowManagerHint)
     window.resize(*size)
     window.show()
     bot = QtBot(None)  # type: ignore[arg-type] # it only waits here, for which it needs no test

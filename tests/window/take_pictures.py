@@ -50,7 +50,7 @@ def take(save: Callable[[str, QImage], object]) -> None:
     evaluator = Evaluator()
     document = with_states(demo_document(evaluator, hairs=HAIRS, guides=GUIDES))
     evaluator.close()
-    hand = hand_at(document, SIZE)
+    hand = hand_at(document, SIZE, managed=False)
     desk = hand.window.desk
     hand.window.commands.run("view.three_quarter")
     hand.rest()
