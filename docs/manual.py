@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import re
+from typing import get_args
 
-from app.window.keymap import PRESETS, Keymap, preset
+from app.window.keymap import PRESETS, Brush, Keymap, Navigation, preset
 from docs.first_groom import chapter
 from tools.registry import Registry
 
 WORDS = {"LMB": "left button", "MMB": "middle button", "RMB": "right button", "Wheel": "wheel"}
-MOVES = {"orbit": "turn", "pan": "slide", "dolly": "nearer, farther", "zoom": "change the lens"}
-BRUSH = {"size": "size of the ring", "strength": "strength", "radial": "radial menu"}
+MOVES = {
+    "orbit": "turn", "tumble": "turn the other way (turntable or free)", "pan": "slide", "dolly": "nearer, farther",
+    "zoom": "change the lens",
+}
+BRUSH = {
+    "size": "size of the ring", "strength": "strength", "radial": "radial menu", "picture": "move, size a pinned picture",
+}
 
 
 def parts() -> dict[str, str]:
@@ -31,10 +37,10 @@ def tools_table(keymaps: list[Keymap]) -> str:
 def navigation_table(keymaps: list[Keymap]) -> str:
     """How each keymap moves the camera and sets the brush."""
     rows = [["", *(k.name for k in keymaps)]]
-    for action, words in MOVES.items():
-        rows.append([words, *(_gestures(k.navigate.get(action, ())) for k in keymaps)])  # type: ignore[call-overload]
-    for action, words in BRUSH.items():
-        rows.append([words, *(_gestures(k.brush.get(action, ())) for k in keymaps)])  # type: ignore[call-overload]
+    for move in get_args(Navigation):
+        rows.append([MOVES[move], *(_gestures(k.navigate.get(move, ())) for k in keymaps)])
+    for brush in get_args(Brush):
+        rows.append([BRUSH[brush], *(_gestures(k.brush.get(brush, ())) for k in keymaps)])
     for name, words in (("view.frame_all", "see everything"), ("view.frame_selected", "see what is selected"),
                         ("view.right", "from the right"), ("view.top", "from above"), ("edit.undo", "undo"),
                         ("tool.symmetry", "symmetry X"), ("window.palette", "find a command")):
