@@ -15,7 +15,8 @@ MOVES = {
     "zoom": "change the lens",
 }
 BRUSH = {
-    "size": "size of the ring", "strength": "strength", "radial": "radial menu", "picture": "move, size a pinned picture",
+    "size": "size of the ring", "strength": "strength", "radial": "radial menu", 
+    "picture": "move or size a pinned picture",
 }
 
 
