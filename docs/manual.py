@@ -15,7 +15,7 @@ MOVES = {
     "zoom": "change the lens",
 }
 BRUSH = {
-    "size": "size of the ring", "strength": "strength", "radial": "radial menu", 
+    "size": "size of the ring", "strength": "strength", "radial": "radial menu",
     "picture": "move or size a pinned picture",
 }
 
