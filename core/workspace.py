@@ -26,10 +26,14 @@ class Reference(Record):
     """An image pinned to the view. Place and width are fractions of the view's width and height from its top left."""
 
     path: str
-    x: float = 0.02
-    y: float = 0.02
-    width: float = 0.25
-    opacity: float = 1.0
+    x: Annotated[float, field(
+        "From the left", "Where its left side is, as a part of the view's width.", "", (0, 1), (-10, 10))] = 0.02
+    y: Annotated[float, field(
+        "From the top", "Where its upper side is, as a part of the view's height.", "", (0, 1), (-10, 10))] = 0.02
+    width: Annotated[float, field(
+        "Width", "How wide it is, as a part of the view's width; its shape stays.", "", (0.02, 1), (0.001, 10))] = 0.25
+    opacity: Annotated[float, field(
+        "Opacity", "How much of the view it covers; less lets the animal shine through.", "", (0, 1), (0, 1))] = 1.0
 
     def __post_init__(self) -> None:
         text(self, "path", longest=4096)

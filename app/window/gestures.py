@@ -18,6 +18,7 @@ from app.window.desk import FAILED, Desk
 from app.window.hotkeys import Hotkeys
 from app.window.keymap import Gesture, normal
 from app.window.navigation import CameraDrag, Eye
+from app.window.picture_drag import PictureDrag, PinnedPictures
 from app.window.radial import Entry, RadialMenu
 from core.errors import UserError
 from core.overlay import Label, Overlays
@@ -87,7 +88,7 @@ class BrushDrag:
     """
 
     def __init__(self, desk: Desk, what: Literal["size", "strength"], x: float, y: float, ratio: float) -> None:
-        self._desk, self._what, self._ratio = desk, what, ratio
+        self._desk, self.what, self._ratio = desk, what, ratio
         self._tool = desk.session.tool
         self.x, self.y = x, y
         self._next: float | None = None
@@ -104,8 +105,8 @@ class BrushDrag:
             return
         pulled = (self._next - self.x) / self._ratio
         self._next = None
-        start = float(getattr(self._tool.params, self._what))
-        self._set(start + pulled * self._ratio if self._what == "size" else start + pulled / 200.0)
+        start = float(getattr(self._tool.params, self.what))
+        self._set(start + pulled * self._ratio if self.what == "size" else start + pulled / 200.0)
 
     def type(self, text: str) -> None:
         """A key of a number; backspace is "\\b"."""
@@ -121,21 +122,21 @@ class BrushDrag:
 
     def cancel(self) -> None:
         """The value from before."""
-        self._set(float(getattr(self._tool.params, self._what)))
+        self._set(float(getattr(self._tool.params, self.what)))
 
     def overlays(self) -> Overlays:
         """The value in words beside the ring."""
         typed = f" [{self.typed}]" if self.typed else ""
-        if self._what == "size":
+        if self.what == "size":
             words = f"Size {self._value:.0f}{typed}"
         else:
             words = f"Strength {self._value:.2f}{typed}"
         return (Label(self.x + 12.0 * self._ratio, self.y - 12.0 * self._ratio, words, "accent"),)
 
     def _set(self, value: float) -> None:
-        least, most = (1.0, 4000.0) if self._what == "size" else (0.0, 1.0)
+        least, most = (1.0, 4000.0) if self.what == "size" else (0.0, 1.0)
         self._value = min(max(value, least), most)
-        self._desk.choose(self._tool.name, **{self._what: self._value})
+        self._desk.choose(self._tool.name, **{self.what: self._value})
 
 
 class Gestures:
@@ -151,6 +152,7 @@ class Gestures:
         self.held = ""
         self._button: str | None = None  # that ends the drag; None when a click does
         self.radial: RadialMenu | None = None
+        self.pictures = PinnedPictures(desk, eye.size, lambda path: None)
 
     @property
     def stroke(self) -> StrokeDrag | None:
@@ -171,6 +173,12 @@ class Gestures:
             self._begin(CameraDrag(self.eye, move, pointer.x, pointer.y), button)
         elif brush == "radial":
             self.open_radial(on_screen)
+        elif brush == "picture":
+            row = self.pictures.at(pointer.x, pointer.y)
+            if row is None:
+                self.desk.said.emit("There is no pinned picture under the pointer.")
+            else:
+                self._begin(PictureDrag(self.pictures, row, pointer.x, pointer.y, self.eye.ratio()), button)
         elif brush is not None:
             self._begin_brush(brush, pointer, button)
         elif button == "LMB" and not self.held and not set(modifiers) - {"Shift", "Ctrl"}:
@@ -215,6 +223,8 @@ class Gestures:
         move, brush = keymap.navigation(gesture), keymap.brushing(gesture)
         if move is not None:
             self.eye.wheel(move, notches, pointer.x, pointer.y)
+        elif brush == "picture":
+            self.pictures.wheel(notches, pointer.x, pointer.y)
         elif brush in ("size", "strength"):
             step = {"size": ("tool.larger", "tool.smaller"), "strength": ("tool.stronger", "tool.weaker")}[brush]
             self.commands.run(step[0] if notches > 0 else step[1])
@@ -263,7 +273,36 @@ class Gestures:
 
     def overlays(self) -> Overlays:
         """What goes on, drawn."""
-        return self.drag.overlays() if isinstance(self.drag, BrushDrag) else ()
+        return self.drag.overlays() if isinstance(self.drag, BrushDrag | PictureDrag) else ()
+
+    def doing(self) -> str:
+        """What goes on and how it ends, for the status line; empty while nothing does."""
+        drag = self.drag
+        if isinstance(drag, StrokeDrag):
+            return f"{self.desk.session.tool.label}: let go to keep it   Esc: give the stroke up"
+        if isinstance(drag, CameraDrag):
+            return f"{drag.words}   Let go: stay there   Esc: look as before"
+        if isinstance(drag, PictureDrag):
+            return f"{'Drag: larger or smaller' if drag.scales else 'Drag: move the picture'}   Esc: put it back"
+        if isinstance(drag, BrushDrag):
+            end = "Click or Enter: keep" if self._button is None else "Let go: keep"
+            return f"Sideways: {drag.what}   Type a number   {end}   Esc or right button: as before"
+        if self.held:
+            return self._held_words()
+        return ""
+
+    def _held_words(self) -> str:
+        """What the buttons do while a key is held."""
+        keymap = self.hotkeys.keymap
+        parts = [
+            f"{text.removeprefix(self.held + '+')}: {action}"
+            for action, gestures in (*keymap.navigate.items(), *keymap.brush.items()) for text in gestures
+            if text.startswith(f"{self.held}+")]
+        parts += [
+            f"{text.removeprefix(self.held + '+')}: {self.commands[name].label.lower()}"
+            for name, keys in keymap.keys.items() if name in self.commands
+            for text in keys if text.startswith(f"{self.held}+")]
+        return f"{self.held} held   " + "   ".join(parts[:8])
 
     def open_radial(self, place: QPoint) -> None:
         """The radial menu at a place of the screen."""

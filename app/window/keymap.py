@@ -26,8 +26,8 @@ BUTTONS = ("LMB", "MMB", "RMB", "Wheel")
 HELD = "Space+"
 FILE = "keymap.json"
 
-Navigation = Literal["orbit", "pan", "dolly", "zoom"]
-Brush = Literal["size", "strength", "radial"]
+Navigation = Literal["orbit", "tumble", "pan", "dolly", "zoom"]
+Brush = Literal["size", "strength", "radial", "picture"]
 Keys = tuple[str, ...]
 
 
@@ -49,7 +49,8 @@ class Conflict(NamedTuple):
 class Keymap(Record):
     """One keymap.
 
-    navigate : gestures that move the camera. brush : gestures of the brush's size and strength and the radial menu.
+    navigate : gestures that move the camera; "orbit" turns as preferred, "tumble" the other way. brush : gestures of
+    the brush's size and strength, the radial menu, and of pictures pinned to the view.
     keys : keys of commands by name; a command that is not named has none.
     """
 

@@ -36,6 +36,7 @@ from app.window.maps_panel import MapsPanel
 from app.window.opening import Opening
 from app.window.outliner import Outliner
 from app.window.palette import Palette
+from app.window.pictures_dialog import PicturesDialog
 from app.window.playblast import PlayblastDialog
 from app.window.plugin_bar import PluginBar
 from app.window.preferences import Preferences
@@ -108,6 +109,7 @@ class MainWindow(QMainWindow):
         self.desk.workspace_changed.connect(self._workspace_changed)
         self.timeline.playback.changed.connect(self._playback_changed)
         self.viewport.failed.connect(self.view.show_trouble)
+        self.viewport.hint.connect(self.status.show_doing)
         self.viewport.settled.connect(self._show_cached)
         if loaded.trouble:
             self.desk.error(UserError(loaded.trouble))
@@ -284,6 +286,10 @@ class MainWindow(QMainWindow):
         self._preferences.raise_()
         self._preferences.activateWindow()
 
+    def show_pictures(self) -> None:
+        """Place and size of the pictures in the view, by numbers."""
+        PicturesDialog(self, self.desk).show()
+
     def show_keymap_editor(self) -> None:
         """The hotkeys beside the window."""
         editor = KeymapEditor(self, self.commands, self.hotkeys.keymap, self._settings.keymap, self._folder)
@@ -430,6 +436,7 @@ class MainWindow(QMainWindow):
 
     def _use_pen(self) -> None:
         self.desk.session.hand.pen = self._settings.pen
+        self.viewport.eye.trackball = self._settings.orbit == "trackball"
 
     # -- events ------------------------------------------------------------------------------------------
 

@@ -43,6 +43,7 @@ class Eye:
         changed: Callable[[], object],
     ) -> None:
         self.desk, self.size, self.ratio, self.changed = desk, size, ratio, changed
+        self.trackball = False  # how orbiting turns; tumbling is the other way
         self._pivot: Array | None = None
         self._corners: tuple[object, Array] | None = None
         self._front: tuple[Mesh, tuple[float, float, float]] | None = None
@@ -206,11 +207,19 @@ class Eye:
         return front * x + right * z, y, front * z - right * x
 
 
+WORDS = {
+    "orbit": "Drag: turn about what was under the pointer", "tumble": "Drag: roll about what was under the pointer",
+    "pan": "Drag: slide the view", "dolly": "Drag up: nearer, down: farther",
+    "zoom": "Drag up: longer lens, down: wider",
+}
+
+
 class CameraDrag:
-    """A gesture that moves the camera from press to release."""
+    """A gesture that moves the camera from press to release. words : what moving does."""
 
     def __init__(self, eye: Eye, action: Navigation, x: float, y: float) -> None:
         self._eye, self._action = eye, action
+        self.words = WORDS[action]
         self._before = eye.camera
         self._pivot = eye.take_pivot(x, y)
         self._last = self._next = (x, y)
@@ -226,8 +235,9 @@ class CameraDrag:
         across, down = self._next[0] - self._last[0], self._next[1] - self._last[1]
         self._last = self._next
         camera, ratio = self._eye.camera, self._eye.ratio()
-        if self._action == "orbit":
-            camera = navigate.orbit(camera, self._pivot, -TURN * across / ratio, TURN * down / ratio)
+        if self._action in ("orbit", "tumble"):
+            turn = navigate.tumble if self._eye.trackball == (self._action == "orbit") else navigate.orbit
+            camera = turn(camera, self._pivot, -TURN * across / ratio, TURN * down / ratio)
         elif self._action == "pan":
             camera = navigate.pan(camera, self._pivot, across, down, self._eye.size()[1])
         elif self._action == "dolly":

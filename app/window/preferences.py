@@ -87,7 +87,8 @@ class Preferences(QDialog):
 
     def _hand(self) -> QWidget:
         page, rows = _page()
-        rows.addWidget(self._setting("keymap"))
+        for name in ("keymap", "orbit"):
+            rows.addWidget(self._setting(name))
         keys = _button("Hotkeys…", "Shows every hotkey, and lets you press another one for a command.")
         keys.clicked.connect(self._owner.show_keymap_editor)
         rows.addWidget(Row("", keys))

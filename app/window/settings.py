@@ -41,6 +41,9 @@ class Settings(Record):
     keymap: Annotated[Literal["blender", "maya", "houdini"], field(
         "Keymap", "Hotkeys and camera gestures like those of the program you know best.",
         choices=("blender", "maya", "houdini"))] = "blender"
+    orbit: Annotated[Literal["turntable", "trackball"], field(
+        "Turning", "Turntable keeps up up while you turn; trackball rolls the view like a ball under your hand.",
+        choices=("turntable", "trackball"))] = "turntable"
     unit: Annotated[Literal["document", "m", "cm", "mm", "in", "ft"], field(
         "Units shown", "Unit of lengths in panels; the document itself stays in metres.",
         choices=("document", "m", "cm", "mm", "in", "ft"))] = "document"

@@ -32,7 +32,8 @@ class StatusLine(QWidget):
         self.copy.setToolTip("Copies the whole message, to send it to whoever looks after the program.")
         self.copy.clicked.connect(self._copy)
         self.copy.hide()
-        self._details = ""
+        self._details = self._doing = ""
+        self._failed = False
         self._until = QTimer(self, singleShot=True)
         self._until.timeout.connect(self.show_hint)
         line = QHBoxLayout(self)
@@ -45,24 +46,34 @@ class StatusLine(QWidget):
         desk.failed.connect(self.fail)
         desk.workspace_changed.connect(self._workspace_changed)
         desk.session_replaced.connect(self.show_hint)
+        desk.jobs.changed.connect(self._jobs_changed)
         self.show_hint()
 
     def say(self, sentence: str) -> None:
         """Show a sentence for a while."""
+        self._failed = False
         self._show(sentence, "text", SAID_MS)
 
     def fail(self, sentence: str, details: str) -> None:
         """Show what went wrong, long enough to be read."""
         self._details = f"{sentence}\n\n{details}" if details else ""
         self._show(sentence, "trouble_text", FAILED_MS)
+        self._failed = True
         self.copy.setVisible(bool(details))
+
+    def show_doing(self, words: str) -> None:
+        """Say what goes on under the hand, over everything but what failed; empty when it has ended."""
+        self._doing = words
+        if not self._until.isActive() or (words and not self._failed):
+            self.show_hint()
 
     def show_hint(self) -> None:
         """Say what mouse and keys do now."""
         self._until.stop()
+        self._failed = False
         self.copy.hide()
-        self._paint("dim")
-        self.words.setText(hint(self._desk, self._hotkeys.keymap))
+        self._paint("text" if self._doing else "dim")
+        self.words.setText(self._doing or hint(self._desk, self._hotkeys.keymap))
 
     def _show(self, sentence: str, colour: str, milliseconds: int) -> None:
         self.copy.hide()
@@ -79,12 +90,18 @@ class StatusLine(QWidget):
         if old.tool != new.tool:
             self.show_hint()
 
+    def _jobs_changed(self) -> None:
+        if not self._until.isActive() and not self._desk.document.meshes:
+            self.show_hint()
+
     def _copy(self) -> None:
         QGuiApplication.clipboard().setText(self._details)
 
 
 def hint(desk: Desk, keymap: Keymap) -> str:
     """What mouse and keys do now, in one line."""
+    if not desk.document.meshes and desk.jobs.running:
+        return f"{desk.jobs.running[0].name}: this takes a moment. Cancel at the right ends it."
     if not desk.document.meshes:
         return "Open a mesh or a project, or drop a file here."
     parts = [desk.session.tool.hint] if desk.document.grooms else []

@@ -217,6 +217,11 @@ VIEW: tuple[Command, ...] = (
         "view.pin_reference", "Pin a reference…", "Pins a picture to the view that stays put while you turn.",
         lambda w: w.pin_reference(), "core.workspace.Reference", icon="image", words="image photo picture"),
     Command(
+        "view.pictures", "Pictures in the view…",
+        "Moves, sizes and fades pinned references by numbers, or takes single ones out.",
+        lambda w: w.show_pictures(), "core.workspace.Reference", "window", icon="image",
+        words="image photo reference background opacity place"),
+    Command(
         "view.no_pictures", "Remove pictures", "Takes the background and every pinned reference out of the view.",
         _no_background, _OPTIONS, enabled=_has_images, words="background reference clear image"),
     Command(

@@ -59,10 +59,11 @@ class Viewport(QOpenGLWindow):
     """The picture of a desk and the hand on it.
 
     painted : a picture is on the screen. settled : nothing is left to do. failed : there is no OpenGL to draw with.
-    hint : what mouse and keys do now has changed.
+    hint : what goes on under the hand has changed, in words; empty when nothing does.
     playing : set while the timeline plays, so that nothing slow is begun.
     """
 
+    hint = Signal(str)
     painted = Signal()
     settled = Signal()
     failed = Signal(str)
@@ -74,6 +75,8 @@ class Viewport(QOpenGLWindow):
         self.playing = False
         self.eye = Eye(desk, self.pixels, self.devicePixelRatio, self.redraw)
         self.gestures = Gestures(desk, self.eye, hotkeys, commands, window)
+        self.gestures.pictures.shape = self._shape_of
+        self._hinted = ""
         self.picture: LivePicture | None = None
         self.frames = self.refined_frames = 0
         self._budget_ms = budget_ms
@@ -107,6 +110,7 @@ class Viewport(QOpenGLWindow):
         """Paint once more, what is drawn or what lies over it."""
         self._wants_paint = True
         self.update()
+        self._tell()
 
     def redraw(self) -> None:
         """Something that is shown has changed."""
@@ -413,11 +417,13 @@ class Viewport(QOpenGLWindow):
         """A key goes up."""
         if not event.isAutoRepeat():
             self.gestures.key_up(Qt.Key(event.key()))
+            self._tell()
             self._change_modifiers(QGuiApplication.queryKeyboardModifiers())
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         """Without the keyboard no key is held."""
         self.gestures.leave()
+        self._tell()
         super().focusOutEvent(event)
 
     def _press(self, button: str, modifiers: Qt.KeyboardModifier, pointer: Pointer, place: QPoint) -> None:
@@ -447,6 +453,17 @@ class Viewport(QOpenGLWindow):
         if self.gestures.drag is None:
             self.unsetCursor()
         self.repaint_soon()
+
+    def _tell(self) -> None:
+        """Say what goes on, when that is something else now."""
+        words = self.gestures.doing()
+        if words != self._hinted:
+            self._hinted = words
+            self.hint.emit(words)
+
+    def _shape_of(self, path: str) -> tuple[int, int] | None:
+        pixels = None if self.picture is None else self.picture.view.pictures.pixels(path)
+        return None if pixels is None else (pixels.shape[0], pixels.shape[1])
 
     def _frame(self) -> None:
         stroking = self.gestures.stroke is not None

@@ -21,8 +21,8 @@ def test_a_preset_has_no_conflict_and_names_only_commands(name: str) -> None:
     keymap = keymaps.preset(name)
     assert keymaps.conflicts(keymap, SCOPES) == ()
     assert set(keymap.keys) <= set(TABLE)
-    assert set(keymap.navigate) >= {"orbit", "pan", "dolly"}
-    assert set(keymap.brush) == {"size", "strength", "radial"}
+    assert set(keymap.navigate) >= {"orbit", "tumble", "pan", "dolly"}
+    assert set(keymap.brush) == {"size", "strength", "radial", "picture"}
 
 
 @pytest.mark.parametrize(("name", "command", "key"), [

@@ -1,0 +1,82 @@
+"""The status line says what mouse and keys do now, whatever goes on; turning is that of the preferences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+
+from core.document import Document
+from tests.window.conftest import Opened
+from tests.window.hand import ALT, LEFT, MIDDLE, RIGHT, SHIFT, Hand
+
+BACK, ASIDE = (0.60, 0.42), (0.68, 0.36)
+
+
+def words(hand: Hand) -> str:
+    return hand.window.status.words.text()
+
+
+def test_during_strokes_moves_of_the_camera_and_the_brush(hand: Hand) -> None:
+    idle = words(hand)
+    assert hand.window.desk.session.tool.hint in idle
+    hand.press(BACK)
+    assert words(hand).startswith("Comb: let go")
+    hand.release(BACK)
+    assert words(hand) == idle
+    hand.press(BACK, MIDDLE)
+    assert "turn about" in words(hand)
+    hand.key(Qt.Key.Key_Escape)
+    assert words(hand) == idle
+    hand.release(BACK, MIDDLE)
+    hand.press(BACK, MIDDLE, SHIFT)
+    assert "slide" in words(hand)
+    hand.release(BACK, MIDDLE, SHIFT)
+    assert words(hand) == idle
+    hand.move(BACK)
+    hand.key(Qt.Key.Key_F)
+    assert "Sideways: size" in words(hand)
+    hand.press(BACK, RIGHT)
+    assert words(hand) == idle
+    hand.release(BACK, RIGHT)
+
+
+def test_what_went_wrong_stays_while_the_hand_goes_on(hand: Hand) -> None:
+    hand.window.desk.edit("Lock", lambda d: d.replace(meshes=(d.meshes[0].replace(locked=True),)))
+    hand.press(BACK)
+    hand.release(BACK)
+    assert "locked" in words(hand)
+    hand.press(BACK, MIDDLE)
+    assert "locked" in words(hand)
+    hand.release(BACK, MIDDLE)
+    assert "locked" in words(hand)
+
+
+def test_a_held_key_says_what_the_buttons_do(opened: Opened, animal: Document) -> None:
+    from PySide6.QtTest import QTest
+
+    hand = opened(animal, keymap="houdini")
+    hand.move(BACK)
+    QTest.keyPress(hand.view, Qt.Key.Key_Space)
+    assert words(hand).startswith("Space held")
+    assert "LMB: orbit" in words(hand)
+    QTest.keyRelease(hand.view, Qt.Key.Key_Space)
+    assert not words(hand).startswith("Space held")
+
+
+@pytest.mark.parametrize("keymap", ["blender", "maya"])
+@pytest.mark.parametrize("style", ["turntable", "trackball"])
+def test_turning_keeps_up_or_rolls_as_preferred(opened: Opened, animal: Document, keymap: str, style: str) -> None:
+    hand = opened(animal, keymap=keymap)
+    window = hand.window
+    window.change_settings(orbit=style)
+    usual = (MIDDLE, Qt.KeyboardModifier.NoModifier) if keymap == "blender" else (LEFT, ALT)
+    other = (MIDDLE, ALT) if keymap == "blender" else (LEFT, ALT | SHIFT)
+    for gesture, level in ((usual, style == "turntable"), (other, style == "trackball")):
+        window.commands.run("view.three_quarter")
+        hand.rest()
+        hand.drag((0.4, 0.3), (0.5, 0.5), *gesture)
+        hand.drag((0.4, 0.3), (0.55, 0.3), *gesture)
+        right = window.desk.workspace.cameras[0].world_from_camera[:3, 0]
+        assert (abs(right[1]) < 1e-6) == level, gesture
+        assert np.linalg.det(window.desk.workspace.cameras[0].world_from_camera[:3, :3]) == pytest.approx(1.0)
