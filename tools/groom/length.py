@@ -13,9 +13,9 @@ from tools.brush import BrushStroke, on_rows
 from tools.ring import BrushParams
 from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
 
-RATE = 0.7  # at strength 1 hair grows by exp of this on a way of one radius
+RATE = 0.25  # at strength 1 hair grows by exp of this on a way of one radius: half as long again in a pass over it
 APPROACH = 3.0  # and comes to within exp of minus this of a length
-SHORTEST = 1e-4  # of the animal's diagonal
+SHORTEST, LONGEST = 1e-4, 1.0  # of the animal's diagonal, when growing and shrinking
 
 How = Literal["grow", "shrink", "set"]
 
@@ -71,4 +71,11 @@ class LengthStroke(BrushStroke[LengthParams]):
             wanted = max(self.wanted, shortest)
             return on_rows(guides, rows, lambda g: set_length(g, wanted, 1.0 - np.exp(-APPROACH * amount), shortest))
         factor = np.exp((RATE if p.how == "grow" else -RATE) * amount)
-        return on_rows(guides, rows, lambda g: set_length(g, lengths(g.points) * factor, None, shortest))
+        longest = LONGEST * self.ground.rest.diagonal
+
+        def scaled(some: Guides) -> Guides:
+            now = lengths(some.points)
+            # what is longer already is left as long as it is
+            return set_length(some, np.minimum(now * factor, np.maximum(longest, now)), None, shortest)
+
+        return on_rows(guides, rows, scaled)
