@@ -103,6 +103,16 @@ class Replaced(NamedTuple):
     document: Document
     doubtful: dict[int, NDArray[np.int32]]
 
+    def with_selection(self) -> Document:
+        """The document with just the doubtful guides selected, in every groom that has some."""
+        document = self.document
+        for groom_id, ids in self.doubtful.items():
+            if len(ids):
+                groom = find_groom(document, groom_id)
+                guides = groom.guides.replace(selected=freeze(np.isin(groom.guides.ids, ids)))
+                document = with_groom(document, groom.replace(guides=guides))
+        return document
+
 
 def replaced_mesh(document: Document, mesh_id: int, mesh: Mesh) -> Replaced:
     """A document with another mesh in place of one, its grooms carried over: roots, strands and painted maps.

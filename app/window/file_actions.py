@@ -14,7 +14,7 @@ from app.deliver import deliver
 from app.window.opening import MESH_SUFFIXES, PICTURE_SUFFIXES, choose_file, filter_of
 from app.window.recent import RecentMenu
 from app.window.screenshot import view_image
-from core.document import find_mesh
+from core.document import Document, find_mesh
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats import camera_file, curve_file
@@ -24,7 +24,7 @@ from core.formats.project import write_project
 from core.groom.grow import grow
 from core.navigate import whole_in
 from core.workspace import Reference
-from tools.document_edits import replace_mesh
+from tools.document_edits import Replaced, replaced_mesh
 from tools.macro import play
 from tools.scene import active_mesh
 
@@ -78,20 +78,37 @@ class FileActions:
         menu = RecentMenu(self._desk, self._window.settings.recent, self._window.opening.open, top)
         menu.popup(top.mapToGlobal(top.rect().bottomLeft()))
 
-    def reload_mesh(self, path: Path | None = None) -> None:
-        """Put another shape in place of the active mesh; its hair comes along."""
-        item = active_mesh(self._desk.document, self._desk.workspace)
+    def reload_mesh(self, path: Path | None = None, mesh_id: int | None = None) -> None:
+        """Put another shape in place of a mesh, the active one unless it is named; its hair comes along."""
+        document = self._desk.session.history.current
+        active = active_mesh(document, self._desk.workspace)
+        item = active if mesh_id is None else find_mesh(document, mesh_id)
         if item is None:
             raise UserError("There is no mesh yet: open or import one first.")
         if path is None:
-            filters = [filter_of("Meshes", MESH_SUFFIXES)]
-            self._choose(f"The new shape of {item.name}", filters, self.reload_mesh)
+            start = self._window.opening.source(item.name)
+            self._choose(
+                f"The new shape of {item.name}", [filter_of("Meshes", MESH_SUFFIXES)],
+                lambda name: self.reload_mesh(name, item.id), start=start)
             return
 
-        def done(found: MeshFile) -> None:
-            self._desk.edit("Reload mesh", replace_mesh, item.id, found.mesh)
+        def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> tuple[MeshFile, Replaced]:
+            found = read_mesh(path, cancel=cancelled)
+            progress(0.7)
+            return found, replaced_mesh(document, item.id, found.mesh)
 
-        self._desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: read_mesh(path, cancel=cancelled), done)
+        def done(result: tuple[MeshFile, Replaced]) -> None:
+            found, replaced = result
+
+            def put(now: Document) -> Document:
+                # the hair may have been combed meanwhile: what was made beside the window is then made anew
+                made = replaced if now is document else replaced_mesh(now, item.id, found.mesh)
+                return made.with_selection()
+
+            if self._desk.edit("Reload mesh", put):
+                self._desk.said.emit(" ".join((reloaded(path.name, replaced), *found.notes)))
+
+        self._desk.jobs.start(f"Read {path.name}", work, done)
 
     def export_coat(self, path: Path | None = None) -> None:
         """Write the active groom with its hairs for a renderer."""
@@ -200,9 +217,21 @@ class FileActions:
         self._desk.said.emit(f"Saved {path.name}.")
         self._window.show_saved()
 
-    def _choose(self, title: str, filters: list[str], done: Callable[[Path], object], save: str = "") -> None:
+    def _choose(
+        self, title: str, filters: list[str], done: Callable[[Path], object], save: str = "", start: Path | None = None,
+    ) -> None:
         path, recent = self._desk.session.path, self._window.settings.recent
-        start = path.parent if path is not None else Path(recent[0]).parent if recent else None
+        if start is None:
+            start = path.parent if path is not None else Path(recent[0]).parent if recent else None
         if save == ".filo" and path is not None:
             start = path
         choose_file(self._window, title, filters, lambda name: self._desk.attempt(done, name), save, start=start)
+
+
+def reloaded(name: str, replaced: Replaced) -> str:
+    """What became of the hair on an updated mesh, in a sentence."""
+    guides = sum(len(ids) for ids in replaced.doubtful.values())
+    if not guides:
+        return f"{name} is in place, with all its hair."
+    return (f"{name} is in place. The skin under {guides:,} {'guide' if guides == 1 else 'guides'} is gone: "
+            "their nearest place was guessed and they are selected, look at them.")

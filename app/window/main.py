@@ -119,7 +119,7 @@ class MainWindow(QMainWindow):
 
     def _make_column(self) -> Column:
         memory, column = FoldMemory(self._folder), Column()
-        self.outliner = Outliner(self.desk)
+        self.outliner = Outliner(self.desk, reload=lambda mesh_id: self.files.reload_mesh(mesh_id=mesh_id))
         made: tuple[tuple[str, QWidget], ...] = (
             ("scene", Section(PANELS["scene"][0], self.outliner, memory, "scene")),
             ("tool", ToolPanel(self.desk, memory)),

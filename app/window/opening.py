@@ -57,6 +57,7 @@ class Opening(QObject):
     ) -> None:
         super().__init__(desk)
         self._desk, self._parent, self._make, self._remember = desk, parent, make, remember
+        self._sources: dict[str, Path] = {}  # where meshes of this run came from, by name
 
     # -- asking ----------------------------------------------------------------------------------------------
 
@@ -67,6 +68,11 @@ class Opening(QObject):
     def ask_import(self) -> None:
         """Let the artist choose a mesh to add."""
         choose_file(self._parent, "Import a mesh", [filter_of("Meshes", MESH_SUFFIXES)], self.import_mesh)
+
+    def source(self, mesh: str) -> Path | None:
+        """The file a mesh of this name was read from, when that was in this run and it is still there."""
+        path = self._sources.get(mesh)
+        return path if path is not None and path.is_file() else None
 
     # -- opening ---------------------------------------------------------------------------------------------
 
@@ -124,6 +130,8 @@ class Opening(QObject):
     def _read_mesh(self, path: Path, then: Callable[[Path, MeshFile], None]) -> None:
         def done(found: MeshFile) -> None:
             then(path, found)
+            if self._desk.document.meshes:
+                self._sources[self._desk.document.meshes[-1].name] = path
             self._remember(path)
             if found.notes:
                 self._desk.said.emit(" ".join(found.notes))

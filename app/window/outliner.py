@@ -103,9 +103,12 @@ class Rows(QStyledItemDelegate):
 class Outliner(QTreeView):
     """The tree of the scene."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, desk: Desk, parent: QWidget | None = None, reload: Callable[[int], object] | None = None,
+    ) -> None:
         super().__init__(parent)
         self._desk = desk
+        self.reload = reload  # asks for an updated file of a mesh
         self._folded: set[int] = set()
         self._following = False
         self.scene = SceneModel(desk)
@@ -353,6 +356,10 @@ class Outliner(QTreeView):
             lambda: self.toggle_isolated(mesh), view.isolated == (mesh.id,))
         add(menu, "Ghost", "ghost", "Shows the mesh translucent, so that you see what lies behind.",
             lambda: self.toggle_ghosted(mesh), mesh.id in view.ghosted)
+        if whole and self.reload is not None:
+            ask = self.reload
+            add(menu, "Reload…", "reload", "Reads an updated file in its place; the hair comes along.",
+                lambda: ask(item.id))
         menu.addSeparator()
         more = menu.addMenu(icon("plus"), "Add groom")
         more.setToolTipsVisible(True)
