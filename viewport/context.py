@@ -40,8 +40,18 @@ def temporary_context() -> Iterator[moderngl.Context]:
     try:
         yield context
     finally:
-        collect(context)
-        context.release()
+        end(context)
+
+
+def end(context: moderngl.Context) -> None:
+    """Release a standalone context with all that Python has dropped in it.
+
+    A released context stays the current one of its thread (moderngl 5.12), and a window that is made there afterwards
+    ends the program: so the thread lets go of it first.
+    """
+    collect(context)
+    context.__exit__(None, None, None)
+    context.release()
 
 
 def collect(context: moderngl.Context) -> int:

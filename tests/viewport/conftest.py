@@ -10,7 +10,7 @@ import pytest
 
 from core.camera import Camera
 from core.errors import UserError
-from viewport.context import collect, standalone_context
+from viewport.context import end, standalone_context
 from viewport.renderer import Renderer
 from viewport.scene import Scene
 
@@ -22,8 +22,7 @@ def ctx() -> Iterator[moderngl.Context]:
     except UserError as error:
         pytest.skip(str(error))
     yield context
-    collect(context)
-    context.release()
+    end(context)
 
 
 @pytest.fixture

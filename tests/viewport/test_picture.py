@@ -13,7 +13,7 @@ import pytest
 
 from core.errors import UserError
 from tests.viewport.scenes import FLAT, ball, camera
-from viewport.context import standalone_context
+from viewport.context import end, standalone_context
 from viewport.picture import render, render_png, write_png
 from viewport.scene import Scene, thinned
 
@@ -25,7 +25,8 @@ def test_a_png_holds_the_picture(ctx, tmp_path):
     render_png(path, scene, camera(), (90, 60), 2)
     read = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
     assert read.shape == (60, 90, 3)
-    assert np.array_equal(read, render(scene, camera(), 90, 60, 2, ctx=ctx))
+    with ctx:  # the picture's own context was the current one in between
+        assert np.array_equal(read, render(scene, camera(), 90, 60, 2, ctx=ctx))
     assert [p.name for p in tmp_path.iterdir()] == ["ball.png"]
 
 
@@ -76,4 +77,4 @@ def test_a_context_offers_core_profile_3_3():
     except UserError as error:
         pytest.skip(str(error))
     assert context.version_code >= 330
-    context.release()
+    end(context)
