@@ -7,7 +7,6 @@ from pathlib import Path
 from PySide6.QtCore import QEvent, QSortFilterProxyModel, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
-    QComboBox,
     QDialog,
     QFileDialog,
     QHBoxLayout,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.window import keymap as keymaps
+from app.window.combo import Combo
 from app.window.commands import Commands, Scope
 from app.window.keymap import Keymap, normal, shown
 from app.window.settings import write_whole
@@ -87,7 +87,7 @@ class KeymapEditor(QDialog):
         self.search = QLineEdit(self)
         self.search.setClearButtonEnabled(True)
         self.search.setPlaceholderText("Find by command, category or key…")
-        self.presets = QComboBox(self)
+        self.presets = Combo(self)
         self.presets.addItems([keymaps.preset(name).name for name in keymaps.PRESETS])
         self.presets.setCurrentIndex(keymaps.PRESETS.index(preset))
         self._model = QStandardItemModel(0, 4, self)

@@ -7,7 +7,6 @@ from pathlib import Path
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter
 from PySide6.QtWidgets import (
-    QComboBox,
     QHBoxLayout,
     QListWidget,
     QPushButton,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.window.combo import Combo
 from app.window.desk import Desk
 from app.window.icons import paint_icon
 from app.window.opening import PICTURE_SUFFIXES, choose_file, filter_of
@@ -125,7 +125,7 @@ class MapsPanel(QWidget):
         self.delete_button = QPushButton("Delete")
         self.delete_button.setToolTip("Takes the chosen map out of the groom; undo brings it back.")
         self.delete_button.clicked.connect(self.delete)
-        self.roles = {role: QComboBox() for role in ROLES}
+        self.roles = {role: Combo() for role in ROLES}
         self.view = UvView(desk)
         buttons = QHBoxLayout()
         buttons.setSpacing(4)

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.movie import MOVIE_SUFFIXES, write_movie, write_sequence
+from app.window.combo import Combo
 from app.window.jobs import Cancelled, Job
 from app.window.opening import choose_file, filter_of
 from core.document import FRAMES
@@ -105,7 +106,7 @@ class PlayblastDialog(QDialog):
         self.job: Job | None = None
         self.setWindowTitle("Playblast")
         document = desk.document
-        self.kind = QComboBox()
+        self.kind = Combo()
         self.kind.addItems([words for words, _ in KINDS])
         self.kind.setToolTip("One movie to send around, or numbered pictures that any program reads.")
         self.first = self._number(*FRAMES, document.first_frame, "The first frame that is drawn.")

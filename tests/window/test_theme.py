@@ -10,7 +10,9 @@ import pytest
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
 
+from app.window.combo import Combo
 from app.window.icons import icon, icon_names, icon_pixmap
 from app.window.theme import THEMES, Look, Theme, apply, load_theme, look_of
 
@@ -120,3 +122,24 @@ def test_an_unknown_icon_is_named(qapp: QApplication) -> None:
 def _pixels(image: QImage) -> np.ndarray:
     image = image.convertToFormat(QImage.Format.Format_ARGB32)
     return np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4).copy()  # B, G, R, A
+
+
+@pytest.mark.parametrize("name", ["light", "dark"])
+def test_a_list_that_drops_down_has_no_bevel(qtbot: QtBot, name: str) -> None:
+    app = QApplication.instance()
+    assert isinstance(app, QApplication)
+    theme = load_theme(name)
+    try:
+        apply(app, theme, 12)
+        combo = Combo()
+        qtbot.addWidget(combo)
+        combo.addItem("")
+        combo.resize(200, 24)
+        image = combo.grab().toImage()
+        limits = [QColor(getattr(theme, colour)).lightness() for colour in ("field", "line", "dim", "panel")]
+        right = [image.pixelColor(x, y).lightness() for x in range(160, 199) for y in range(1, 23)]
+        assert min(limits) - 8 <= min(right)
+        assert max(right) <= max(limits) + 8
+        assert len({image.pixel(x, 12) for x in range(175, 196)}) > 2  # the chevron
+    finally:
+        apply(app, load_theme("dark"), 12)
