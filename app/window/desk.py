@@ -92,8 +92,8 @@ class Desk(QObject):
             return FAILED
 
     def error(self, error: Exception, details: str = "") -> None:
-        """Say what went wrong; the details can be copied."""
-        self.failed.emit(str(error), details)
+        """Say what went wrong; the details, or what the error notes beside its words, can be copied."""
+        self.failed.emit(str(error), details or "\n".join(getattr(error, "__notes__", ())))
 
     def end_stroke(self, cancel: bool = False) -> None:
         """Release (or give up) the stroke that goes on, and let panels look again."""

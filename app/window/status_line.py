@@ -56,10 +56,10 @@ class StatusLine(QWidget):
 
     def fail(self, sentence: str, details: str) -> None:
         """Show what went wrong, long enough to be read."""
-        self._details = f"{sentence}\n\n{details}" if details else ""
+        self._details = f"{sentence}\n\n{details}".rstrip()
         self._show(sentence, "trouble_text", FAILED_MS)
         self._failed = True
-        self.copy.setVisible(bool(details))
+        self.copy.show()
 
     def show_doing(self, words: str) -> None:
         """Say what goes on under the hand, over everything but what failed; empty when it has ended."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 
 from core.document import Document
+from core.errors import UserError
 from tests.window.conftest import Opened
 from tests.window.hand import ALT, LEFT, MIDDLE, RIGHT, SHIFT, Hand
 
@@ -50,6 +52,19 @@ def test_what_went_wrong_stays_while_the_hand_goes_on(hand: Hand) -> None:
     assert "locked" in words(hand)
     hand.release(BACK, MIDDLE)
     assert "locked" in words(hand)
+
+
+def test_whatever_went_wrong_can_be_copied(hand: Hand) -> None:
+    error = UserError("The file is damaged.")
+    error.add_note("at byte 7")
+    hand.window.desk.error(error)
+    assert words(hand) == "The file is damaged."
+    hand.window.status.copy.click()
+    assert QGuiApplication.clipboard().text() == "The file is damaged.\n\nat byte 7"
+    hand.window.desk.error(UserError("There is no mesh."))
+    assert hand.window.status.copy.isVisible()
+    hand.window.status.copy.click()
+    assert QGuiApplication.clipboard().text() == "There is no mesh."
 
 
 def test_a_held_key_says_what_the_buttons_do(opened: Opened, animal: Document) -> None:
