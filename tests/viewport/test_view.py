@@ -321,7 +321,8 @@ def alive() -> int:
         moderngl.Program,
     )  # fmt: skip
     gc.collect()
-    return sum(isinstance(o, kinds) and not isinstance(o.mglo, moderngl.InvalidObject) for o in gc.get_objects())
+    # type() and not isinstance(), which asks what dead proxies of others stood for
+    return sum(type(o) in kinds and not isinstance(o.mglo, moderngl.InvalidObject) for o in gc.get_objects())
 
 
 def test_two_hundred_scenes_leave_nothing_behind(ctx, view, present):
