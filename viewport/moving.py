@@ -16,10 +16,8 @@ from viewport.drawables.strands import CoatDrawable
 from viewport.kept import matched, same
 from viewport.light_maps import LightMaps, alike
 from viewport.near_side import (
-    grown_box,
     near_guides,
     roots_of,
-    rows_in_box,
     shown_rows,
     sparse_coat,
     sparse_points,
@@ -31,6 +29,7 @@ from viewport.patch import Patch
 from viewport.renderer import Renderer, camera_uniforms, light_directions, light_uniforms
 from viewport.ribbons import far_to_near
 from viewport.scene import Coat, GuideLines, Scene, mean_width
+from viewport.touched import Touched
 
 MOST_ACROSS = 6.0  # strands of a wide ribbon
 MAP_SIDE = 256  # of the light's maps that are drawn anew whenever the light turns
@@ -63,9 +62,10 @@ class Moving:
         self._moved: list[NDArray[np.bool_]] = []  # since the finished picture, of every coat
         self._opened: list[NDArray[np.bool_]] = []  # where they were is a hole
         self._neighbours: list[Neighbours] = []
+        self._still: list[Coat] = []  # what is drawn of every coat, as it was in the finished picture
         self._guides_moved: list[NDArray[np.bool_]] = []
         self._last_guides: list[GuideLines] = []
-        self._box = np.zeros(4)  # around all that moved since: left, top, right, bottom, pixels
+        self._touched = Touched((0, 0))  # by all that moved since
         self._sparse: list[tuple[Coat, Coat]] = []  # in the scene, and what is drawn of it
         self._near: list[tuple[GuideLines, GuideLines]] = []
 
@@ -103,15 +103,13 @@ class Moving:
         for drawable in drawables:
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0}))
-        behind, box = self.base, None
-        if picture is not None:
-            behind, box = self._patched(scene, camera, picture, uniforms["clip_from_world"]), self._box
+        behind = self.base if picture is None else self._patched(scene, camera, picture, uniforms["clip_from_world"])
         self.touched = []
         self.ctx.copy_framebuffer(target, behind.framebuffer)
         view_row = -view_from_world(camera)[2]
         for drawable in drawables:
             strands = _shown(drawable).points
-            rows = None if box is None else rows_in_box(strands, camera, size, box)
+            rows = None if picture is None else self._touched.reached_by(strands, camera)
             order = _finish(far_to_near(strands, view_row, rows=rows))
             points, across = np.arange(drawable.textures.per_strand), self._strands_across(drawable)
             matrix = uniforms["clip_from_world"]
@@ -129,9 +127,10 @@ class Moving:
         self._moved = [np.zeros(len(coat.points), bool) for coat in scene.coats]
         self._opened = [moved.copy() for moved in self._moved]
         self._neighbours = [Neighbours(coat, drawn, camera) for coat, drawn in self._sparse]
+        self._still = [drawn for _, drawn in self._sparse]
         self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
         self._last_guides = [drawable.lines for drawable in self.renderer.guides]
-        self._box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+        self._touched = Touched(picture[0].color.size)
 
     def _patched(
         self, scene: Scene, camera: Camera, picture: tuple[DisplayTarget, int], matrix: np.ndarray
@@ -140,7 +139,6 @@ class Moving:
         patch, renderer = self.patch, self.renderer
         if patch.number != picture[1]:
             self.keep(scene, camera, picture)
-        size = picture[0].color.size
         assert self.base is not None
         assert patch.target is not None
         for i, (coat, drawn) in enumerate(self._sparse):
@@ -154,11 +152,14 @@ class Moving:
                 self._opened[i][new] = True
                 new = new[turned_to(camera, roots_of(coat.points)[new], coat.normals[new])]
                 patch.open(renderer.coats[i].textures, new, self.base, matrix)
-                self._box = grown_box(self._box, coat.points, new, camera, size)
+                self._touched.add(coat.points, new, camera)
             assert drawn.order is not None
             moved = np.flatnonzero(self._moved[i][drawn.order])
             patch.open(self.coats[i].textures, moved, self.base, matrix)
-            self._box = grown_box(self._box, drawn.points, moved, camera, size)
+            self._touched.add(drawn.points, moved, camera)
+            still = self._still[i]
+            assert still.order is not None
+            self._touched.add(still.points, np.flatnonzero(self._moved[i][still.order]), camera)
         for i, lines in enumerate(scene.guides):
             rows = [rows for points, rows in self.touched if points is lines.points]
             changed = changed_guides(self._last_guides[i], lines)
@@ -170,8 +171,8 @@ class Moving:
             patch.open(renderer.guides[i].textures, near[new[near]], self.base, matrix)
             moved = np.flatnonzero(self._guides_moved[i][near])
             patch.open(self.guides[i].textures, moved, self.base, matrix)
-            for strands, rows_of_box in ((self._last_guides[i].points, near[new[near]]), (lines.points, near[moved])):
-                self._box = grown_box(self._box, strands, rows_of_box, camera, size)
+            for strands, rows_touched in ((self._last_guides[i].points, near[new[near]]), (lines.points, near[moved])):
+                self._touched.add(strands, rows_touched, camera)
         self._last_guides = list(scene.guides)
         return patch.target
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.camera import Camera, pixel_scale, project
+from core.camera import Camera, pixel_scale
 from viewport.scene import Coat, GuideLines
 
 AWAY = -0.35  # cosine between skin and the way to the eye below which hair is hidden by what it grows on
 TURNING_POINTS, MOST_TURNING = 5, 700  # of a guide, and guides of a groom, while the camera moves
 FEWEST_POINTS, MOST_POINTS = 4, 8  # of a hair while the hand moves
-BOX_MARGIN = 24.0  # pixels around what moved
 MOST_COVER = 0.7  # of the picture, all hairs side by side: what filling them may cost
 BLUNT = 0.6  # of its root the least width of the tip of a ribbon that stands for several hairs
 PIXELS_A_PIECE = 7.0  # of a hair of usual length
@@ -119,31 +118,3 @@ def near_guides(lines: GuideLines, camera: Camera, turning: bool = False) -> Gui
         points=fewer_points(lines.points, rows, count), states=lines.states[rows],
         normals=None if lines.normals is None else lines.normals[rows],
     )
-
-
-def _ends(points: np.ndarray, rows: NDArray[np.integer]) -> np.ndarray:
-    """(3, n, 3): root, middle and tip of these rows of strands."""
-    at = [0, (points.shape[2] if points.shape[1] == 3 else points.shape[1]) // 2, -1]
-    return np.stack([points[rows][:, :, k] if points.shape[1] == 3 else points[rows, k] for k in at])
-
-
-def grown_box(
-    box: NDArray[np.float64], points: np.ndarray, rows: NDArray[np.integer], camera: Camera, size: tuple[int, int]
-) -> NDArray[np.float64]:
-    """The box (left, top, right, bottom in pixels), grown around these rows of strands."""
-    if len(rows) == 0:
-        return box
-    xy, depth = project(camera, _ends(points, rows), *size)
-    if (depth <= camera.near).any():
-        return np.array([-np.inf, -np.inf, np.inf, np.inf])
-    low, high = xy.reshape(-1, 2).min(axis=0) - BOX_MARGIN, xy.reshape(-1, 2).max(axis=0) + BOX_MARGIN
-    return np.concatenate([np.minimum(box[:2], low), np.maximum(box[2:], high)])
-
-
-def rows_in_box(
-    points: np.ndarray, camera: Camera, size: tuple[int, int], box: NDArray[np.float64]
-) -> NDArray[np.integer]:
-    """Rows of strands of which a part may lie in the box."""
-    xy = project(camera, _ends(points, np.arange(len(points))), *size).xy
-    low, high = xy.min(axis=0) - BOX_MARGIN, xy.max(axis=0) + BOX_MARGIN
-    return np.flatnonzero((low <= box[2:]).all(axis=1) & (high >= box[:2]).all(axis=1))
