@@ -38,7 +38,8 @@ def embed(dofs: Sequence[Dof], poses: Sequence[Pose]) -> Array:
     if turning:
         q = np.array([[pose.rotations.get(d.control, _REST_TURN) for d in turning] for pose in poses], np.float64)
         q = q.reshape(len(poses), len(turning), 4)
-        frames = np.array([(d.axis, d.side, np.cross(d.axis, d.side)) for d in turning])
+        frames = np.array([(d.axis, d.side, (0.0, 0.0, 0.0)) for d in turning])
+        frames[:, 2] = np.cross(frames[:, 0], frames[:, 1])
         swung = np.einsum("dij,ndj->ndi", frames, rotated_axis(q, frames[:, 0]))
         twisted = faded_twist(q, frames[:, 0])
     at = turn = 0
