@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from core.mesh.scatter_kernels import (
     BLOCK,
     FIRST_RADIUS,
+    LOG_SHRINK,
     MAX_LEVELS,
     NEVER,
     OCTAVES,
@@ -77,9 +79,15 @@ def even_subset(
             darts.active[found : found + len(newcomers)] = newcomers
             found += len(newcomers)
             seen += len(newcomers)
-        darts.throw(found, level)
+        darts.throw(found, level, _last_level(level, darts.accepted, count))
     n = darts.accepted
     return Subset(darts.chosen[:n].copy(), darts.levels[:n].copy(), dry)
+
+
+def _last_level(level: int, accepted: int, count: int) -> int:
+    """The level that will bring the roots to `count`, as each has SHRINK^-2 times the roots of the one before."""
+    missing = count / max(1, accepted)
+    return level + max(0, math.ceil(math.log(missing) / (-2.0 * LOG_SHRINK)) - 1)
 
 
 class _Darts:
@@ -107,13 +115,15 @@ class _Darts:
         self._mask = 0
         self._firsts, self._new_firsts = np.zeros(BLOCK + 1, np.int32), np.full(BLOCK, -1, np.int32)
 
-    def throw(self, count: int, level: int) -> None:
-        """Make roots of the first `count` of the active candidates where they fit; the rest sleeps."""
+    def throw(self, count: int, level: int, last: int) -> None:
+        """Make roots of the first `count` of the active candidates where they fit; the rest sleeps, most of them for
+        good when they lie too near for the level `last`."""
         radius = FIRST_RADIUS * self._size * SHRINK**level
         cell = CELL * radius
         self._build_grid(cell)
         known = self._candidates[:4]
-        at = radius, self._size, level, self.wake, self.chosen, self.levels, self.accepted
+        last_radius = FIRST_RADIUS * self._size * SHRINK**last
+        at = radius, last_radius, self._size, level, self.wake, self.chosen, self.levels, self.accepted
 
         def test(start: int, stop: int) -> None:
             test_candidates(

@@ -166,6 +166,7 @@ def _wake(near, size, level):  # type: ignore[no-untyped-def]
     """The level at which the radius has become smaller than the distance whose square is `near`."""
     if near <= 0.0:
         return NEVER
+    near *= 1.0 + 1e-5  # too early does no harm; too late would, by the last digit of the distance
     wake = max(level + 1, int(math.log(near / (FIRST_RADIUS * size) ** 2) * (0.5 / LOG_SHRINK)) + 1)
     return wake if wake < MAX_LEVELS else NEVER
 
@@ -186,14 +187,14 @@ def waking(wake, end, level, active):  # type: ignore[no-untyped-def]
     types.int64(
         types.boolean, types.int32[::1], types.int64, types.int64, I32_1D, F32_2D, F32_1D, F32_2D,
         types.float32[:, ::1], types.int32[::1], types.int32[::1], types.int32[::1], types.int64[::1], types.float64,
-        types.int64, types.float64, types.float64, types.int64, types.uint16[::1], types.int64[::1], types.int64[::1],
-        types.int64
+        types.int64, types.float64, types.float64, types.float64, types.int64, types.uint16[::1], types.int64[::1],
+        types.int64[::1], types.int64
     ),
     cache=True, nogil=True, error_model="numpy",
 )
 def test_candidates(  # type: ignore[no-untyped-def]
     accepting, active, start, stop, triangle, places, stretch, normals, roots, faces, firsts, links, counts, cell,
-    mask, radius, size, level, wake, chosen, levels, accepted
+    mask, radius, last_radius, size, level, wake, chosen, levels, accepted
 ):
     """Put to sleep those of candidates ``active[start:stop]`` that are awake and lie too near a root.
 
@@ -201,12 +202,13 @@ def test_candidates(  # type: ignore[no-untyped-def]
         are left empty with -1. Otherwise they lie from ``firsts[b]`` to ``firsts[b + 1]`` and are only read, so that
         any number of threads can do this at once.
 
-    When a root is clearly near, no nearer one is looked for. Two roots of different stretch keep the distance of the
+    When a root is clearly near, or nearer than the `last_radius` that is going to be asked for, no nearer one is looked
+    for: that changes when a candidate is tested, never what becomes a root. Two roots of different stretch keep the distance of the
     smaller one, so that a ball never leaves 8 cells. Returns how many roots there are. (One function, for calls with
     arrays cost as much as the search.)
     """
     limit = np.float32(radius * radius)
-    enough = np.float32(ENOUGH * ENOUGH) * limit
+    enough = np.float32(max(ENOUGH * radius, last_radius) ** 2)
     before = accepted
     for at in range(start, stop):
         c = active[at]
@@ -227,8 +229,16 @@ def test_candidates(  # type: ignore[no-untyped-def]
             di = -1 if fx < edge else (1 if fx > 1.0 - edge else 0)
             dj = -1 if fy < edge else (1 if fy > 1.0 - edge else 0)
             dk = -1 if fz < edge else (1 if fz > 1.0 - edge else 0)
+            # squares of the distances to those sides
+            sx = (fx if di < 0 else 1.0 - fx) ** 2 / (scale * scale)
+            sy = (fy if dj < 0 else 1.0 - fy) ** 2 / (scale * scale)
+            sz = (fz if dk < 0 else 1.0 - fz) ** 2 / (scale * scale)
+            widest = min(own, np.float32(1 << octave)) ** 2
             for corner in range(8):
                 if (corner & 1 and di == 0) or (corner & 2 and dj == 0) or (corner & 4 and dk == 0):
+                    continue
+                away = sx * (corner & 1) + sy * (corner >> 1 & 1) + sz * (corner >> 2)
+                if away > best * widest:
                     continue
                 i, j, k = i0 + di * (corner & 1), j0 + dj * (corner >> 1 & 1), k0 + dk * (corner >> 2)
                 b = _bucket(octave, i, j, k, mask)
