@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.document import MeshObject
+from core.errors import UserError
 from core.pose.pose import Pose, local_of_pose
 from core.pose.synthesis import Prepared, felt, prepare, run_weights
 
@@ -35,13 +36,21 @@ class CorrectiveShapes(NamedTuple):
 
 
 def corrective_shapes(item: MeshObject) -> CorrectiveShapes:
-    """The corrections of `item` as blend shapes, and a note where some cannot be (those made after skinning)."""
+    """The corrections of `item` as blend shapes, and a note where some cannot be (those made after skinning).
+
+    Raises
+    ------
+    UserError
+        When a layer mixes whole surfaces, which no sum of shapes before the skin can say.
+    """
     if item.rig is None or item.correctives is None:
         return CorrectiveShapes((), (), ())
     layers = prepare(item.correctives, item.rig)
     taken = set() if item.rig.shapes is None else set(item.rig.shapes.names)
     shapes, late = [], 0
     for k, ready in enumerate(layers):
+        if ready.layer.kind == "interpolation":
+            raise UserError(f"The layer {ready.layer.name!r} mixes shapes; switch it to pose space before writing it.")
         late += len(ready.late)
         systems: dict[int, list[int]] = {}
         for g, solved in enumerate(ready.solved):

@@ -114,9 +114,40 @@ def find_pose(correctives: Correctives, name: str) -> tuple[int, int] | None:
     return None
 
 
+def place_of(correctives: Correctives, name: str) -> tuple[int, int]:
+    """As :func:`find_pose`; UserError when there is none."""
+    found = find_pose(correctives, name)
+    if found is None:
+        raise UserError(f"There is no sculpted pose {name!r}; choose one from the list of poses.")
+    return found
+
+
+def renamed_pose(correctives: Correctives, name: str, to: str) -> Correctives:
+    """Correctives with another name for a sculpted pose, here and where layers above are silent at it."""
+    named = to.strip()
+    place_of(correctives, name)
+    if not named or not named.isprintable() or len(named) > 255 or named == REST_NAME:
+        raise UserError(f"A pose needs a name of its own of letters, not {REST_NAME!r}.")
+    if named != name and find_pose(correctives, named) is not None:
+        raise UserError(f"There is a pose {named!r} already; choose another name.")
+
+    def pose(one: Pose) -> Pose:
+        other: Pose = one.replace(name=named) if one.name == name else one
+        return other
+
+    layers = []
+    for layer in correctives.layers:
+        space = layer.space.replace(
+            samples=tuple(s.replace(pose=pose(s.pose)) for s in layer.space.samples),
+            anchors=tuple(pose(anchor) for anchor in layer.space.anchors))
+        layers.append(layer.replace(space=space))
+    changed: Correctives = correctives.replace(layers=tuple(layers))
+    return changed
+
+
 def without_pose(correctives: Correctives, name: str) -> Correctives:
     """Correctives without that pose; a layer without poses goes as well. `refresh` the rest."""
-    at, k = _place(correctives, name)
+    at, k = place_of(correctives, name)
     layer = correctives.layers[at]
     keep = [i for i in range(len(layer.space.samples)) if i != k]
     left = _resampled(layer, tuple(layer.space.samples[i] for i in keep), keep)
@@ -128,7 +159,7 @@ def without_pose(correctives: Correctives, name: str) -> Correctives:
 
 def merged_poses(correctives: Correctives, names: Sequence[str]) -> Correctives:
     """Correctives with poses of one layer as one, at the first of them, the sculpts averaged. `refresh` the rest."""
-    places = [_place(correctives, name) for name in names]
+    places = [place_of(correctives, name) for name in names]
     if len({i for i, _ in places}) != 1 or len(places) < 2:
         raise UserError("Only poses of one layer can be merged; choose two or more of the same layer.")
     at, chosen = places[0][0], [k for _, k in places]
@@ -154,7 +185,7 @@ def moved_pose(
 
     `refresh` the rest.
     """
-    at, k = _place(correctives, name)
+    at, k = place_of(correctives, name)
     layer = correctives.layers[at]
     alone = layer.replace(
         space=layer.space.replace(samples=(PoseSample(pose=pose),), anchors=(), kernel="gaussian", rest_falloffs={}),
@@ -204,13 +235,6 @@ def sculpt_errors(
             posed = evaluate(points, rig, correctives, sample.pose, prepared=ready)[layer.vertices]
             out[sample.name] = np.linalg.norm(posed - layer.targets[k], axis=1)
     return out
-
-
-def _place(correctives: Correctives, name: str) -> tuple[int, int]:
-    found = find_pose(correctives, name)
-    if found is None:
-        raise UserError(f"There is no sculpted pose {name!r}; choose one from the list of poses.")
-    return found
 
 
 def _layer(name: str, space: PoseSpace, vertices: NDArray[np.int32]) -> PoseLayer:

@@ -20,6 +20,7 @@ from core.record import Record, column, number, text
 Kernel = Literal[
     "gaussian", "thin-plate", "multiquadric", "inverse-multiquadric", "wendland", "cubic", "linear", "shepard"
 ]
+Way = Literal["pose-space", "linear", "combination", "interpolation"]
 DofKind = Literal["swing", "twist", "swing-twist", "translation", "number"]
 FALLOFFS = {"swing": 2, "twist": 1, "swing-twist": 3, "translation": 3, "number": 1}  # of a kind
 REST_NAME = REST.name
@@ -146,8 +147,9 @@ class PoseSpace(Record, kw_only=True):
 class PoseLayer(Record, kw_only=True):
     """The corrections of some vertices in one space, upon the layers below.
 
-    kind : what turns a pose into weights: the pose space; or plain correctives, each by how far the pose has gone
-        towards its own, all added up: "linear" by projection, "combination" by the product over the controls.
+    kind : what turns a pose into weights: the pose space; or, to compare with, plain correctives, each by how far the
+        pose has gone towards its own, all added up: "linear" by projection, "combination" by the product over the
+        controls; or shape "interpolation", where the surfaces themselves are mixed and not the corrections.
     vertices : (n,) int32, unique; vertices that share a row of `moved` stand together.
     moved : (M, n) bool, the poses that are samples of the vertex; the others do not know of it.
     after : (n,) bool, True where the skin cannot be inverted well: the correction then is added after skinning,
@@ -159,7 +161,7 @@ class PoseLayer(Record, kw_only=True):
 
     name: str = "layer"
     space: PoseSpace
-    kind: Literal["pose-space", "linear", "combination"] = "pose-space"
+    kind: Way = "pose-space"
     enabled: bool = True
     vertices: np.ndarray
     moved: np.ndarray
@@ -169,7 +171,7 @@ class PoseLayer(Record, kw_only=True):
 
     def __post_init__(self) -> None:
         text(self, "name")
-        if self.kind not in ("pose-space", "linear", "combination"):
+        if self.kind not in get_args(Way):
             raise ValueError(f"PoseLayer.kind {self.kind!r} is not known")
         samples = len(self.space.samples)
         column(self, "vertices", np.int32, (None,))

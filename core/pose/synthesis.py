@@ -16,7 +16,7 @@ from core.pose.clip import numbers_at
 from core.pose.corrective import plain_weights
 from core.pose.embedding import embed
 from core.pose.extraction import skin_affine, surface_rotations
-from core.pose.pose import Pose, local_of_pose, pose_of_local
+from core.pose.pose import REST, Pose, local_of_pose, pose_of_local
 from core.pose.pose_space import Correctives, Dof, PoseLayer
 from core.pose.rig import Rig, resting_numbers
 from core.pose.skinning import local_at, moved_number, skin_matrices_of, skinned
@@ -165,6 +165,48 @@ def deform(
     ranges: Ranges = serial_ranges,
 ) -> NDArray[np.float32]:
     """As :func:`evaluate`, with the joints at `local` (J, 4, 4), which may be scaled as no pose says."""
+    mixed = [ready.layer for ready in prepared if ready.layer.kind == "interpolation"]
+    return _mixed(mixed, mesh_points, rig, prepared, np.asarray(local, np.float64), pose, ranges)
+
+
+def _mixed(
+    layers: list[PoseLayer], mesh_points: NDArray[np.float32], rig: Rig, prepared: tuple[Prepared, ...], local: Array,
+    pose: Pose, ranges: Ranges,
+) -> NDArray[np.float32]:
+    """Shape interpolation: the surfaces at rest and at the samples of the last of `layers`, mixed by its weights.
+
+    Controls that the layer does not read stay as they are posed, so the shapes are carried along by the joints above.
+    """
+    if not layers:
+        return _added(mesh_points, rig, prepared, local, pose, ranges)
+    *others, layer = layers
+    shares = plain_weights(layer, felt(pose, rig, mesh_points, local))
+    stops = [REST, *(sample.pose for sample in layer.space.samples)]
+    out = np.zeros(mesh_points.shape, np.float32)
+    for share, stop in zip([1.0 - float(shares.sum()), *shares.tolist()], stops, strict=True):
+        if abs(share) > 1e-9:
+            there, joints = _with_controls(layer.space.controls, pose, stop, rig, local)
+            out += np.float32(share) * _mixed(others, mesh_points, rig, prepared, joints, there, ranges)
+    return out
+
+
+def _with_controls(controls: tuple[str, ...], pose: Pose, stop: Pose, rig: Rig, local: Array) -> tuple[Pose, Array]:
+    """The pose and the joints (J, 4, 4) with some controls as another pose has them."""
+    there: Pose = pose.replace(**{
+        field: {**{c: v for c, v in getattr(pose, field).items() if c not in controls},
+                **{c: v for c, v in getattr(stop, field).items() if c in controls}}
+        for field in ("rotations", "translations", "numbers")
+    })
+    joints, other = local.copy(), local_of_pose(rig.skeleton, there)
+    mine = [j for j, name in enumerate(rig.skeleton.names) if name in controls]
+    joints[mine] = other[mine]
+    return there, joints
+
+
+def _added(
+    mesh_points: NDArray[np.float32], rig: Rig, prepared: tuple[Prepared, ...], local: Array, pose: Pose,
+    ranges: Ranges,
+) -> NDArray[np.float32]:
     matrices = skin_matrices_of(rig.skeleton, local)
     points, late = corrected(mesh_points, rig, prepared, felt(pose, rig, mesh_points, local), ranges)
     out = skinned(points, rig.skin, matrices, rig.skinning, ranges)
