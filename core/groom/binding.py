@@ -10,6 +10,7 @@ from core.groom.guides import Guides
 from core.mesh.intrinsic import Binding, Rebound, SurfaceSites
 from core.mesh.mesh import Mesh, Triangles
 from core.mesh.roots import Roots
+from core.workers import Workers
 
 MOST_EDITS = 64  # guides changed at once beyond which everything is bound anew
 DRIFT = 0.5  # edits over guides beyond which likewise: each leaves a triangulation a little off the best
@@ -73,16 +74,17 @@ class CoatBinding:
 
     def __init__(
         self, mesh: Mesh, triangles: Triangles, guides: Guides, triangle: NDArray[np.int32],
-        barycentric: NDArray[np.float32], seed: int = 0,
+        barycentric: NDArray[np.float32], seed: int = 0, workers: Workers | None = None,
     ) -> None:
-        self._mesh, self._triangles, self._seed = mesh, triangles, seed
+        self._mesh, self._triangles, self._seed, self._workers = mesh, triangles, seed, workers
         self._places = triangle, barycentric
         self._bind(guides)
 
     def _bind(self, guides: Guides) -> None:
         sites = triangle_places(self._mesh, self._triangles, guides.roots)
         self._sites = SurfaceSites(
-            self._mesh.points, self._triangles.vertices, *sites, *self._places, seed=self._seed
+            self._mesh.points, self._triangles.vertices, *sites, *self._places, seed=self._seed,
+            workers=self._workers,
         )
         self._ids, self._roots = guides.ids, guides.roots
 

@@ -70,19 +70,24 @@ class Children:
     triangle, barycentric : (N,) and (N, 3), places in rank order, as scattered.
     binding : of those places.
     triangles : (T, 3) int32. triangle_uvs : (T, 3, 2) float32 or None.
+    ranges : threads, to sort the rows with.
     """
 
     def __init__(
         self, triangle: NDArray[np.int32], barycentric: NDArray[np.float32], binding: Binding,
         triangles: NDArray[np.int32], triangle_uvs: NDArray[np.float32] | None = None, count: int = 16,
+        ranges: Ranges = serial_ranges,
     ) -> None:
-        order = binding.order
-        self.ids = order.astype(np.int32)
-        self.triangle = np.asarray(triangle, np.int32)[order]
-        self.bary = np.ascontiguousarray(np.asarray(barycentric, np.float32)[order, :2])
-        self.sites = np.ascontiguousarray(binding.sites[order])
-        self.weights = np.ascontiguousarray(binding.weights[order, :2])
-        self.length = np.ones(len(order), np.float32)
+        n = len(binding.order)
+        self.ids = binding.order.astype(np.int32)
+        self.triangle, self.bary = np.empty(n, np.int32), np.empty((n, 2), np.float32)
+        self.sites, self.weights = np.empty((n, 3), np.int32), np.empty((n, 2), np.float32)
+        places = np.ascontiguousarray(triangle, np.int32), np.ascontiguousarray(barycentric, np.float32)
+        ranges(n, lambda start, stop: kernels.take_places(
+            self.ids, *places, binding.sites, binding.weights, start, stop, self.triangle, self.bary, self.sites,
+            self.weights,
+        ), 16384)
+        self.length = np.ones(n, np.float32)
         self.traits = Traits()
         self.count = count
         self.triangles = np.ascontiguousarray(triangles, np.int32)
@@ -92,7 +97,7 @@ class Children:
         self._points: NDArray[np.float32] | None = None
         self._prepared = np.empty((0, 4, count), np.float32)
         self._row_of: NDArray[np.int32] | None = None
-        self._guides = int(self.sites.max()) + 1 if len(order) else 0  # at least so many are needed
+        self._guides = int(self.sites.max()) + 1 if n else 0  # at least so many are needed
 
     def __len__(self) -> int:
         return len(self.ids)

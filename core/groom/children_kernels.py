@@ -24,11 +24,26 @@ U2 = types.Array(types.uint32, 2, "C", readonly=True)
 OUT_F2 = types.Array(types.float32, 2, "C")
 OUT_F3 = types.Array(types.float32, 3, "C")
 OUT_I1 = types.Array(types.int32, 1, "C")
+OUT_I2 = types.Array(types.int32, 2, "C")
 OUT_U1 = types.Array(types.uint8, 1, "C")
 I8 = types.int64
 
 # no nnan and ninf: a broken guide must give NaN, not anything at all
 FAST = {"contract", "reassoc", "nsz", "arcp", "afn"}
+
+
+@njit(types.void(I1, I1, F2, I2, F2, I8, I8, OUT_I1, OUT_F2, OUT_I2, OUT_F2), cache=True, nogil=True)
+def take_places(  # type: ignore[no-untyped-def]
+    order, triangle, bary, sites, weights, start, stop, out_triangle, out_bary, out_sites, out_weights
+):
+    """Rows start .. stop of what is bound, taken in `order`; of three weights the first two."""
+    for i in range(start, stop):
+        row = order[i]
+        out_triangle[i] = triangle[row]
+        for k in range(2):
+            out_bary[i, k], out_weights[i, k] = bary[row, k], weights[row, k]
+        for k in range(3):
+            out_sites[i, k] = sites[row, k]
 
 
 @njit(types.void(F3, F2, U1, I8, I8, OUT_F3), cache=True, nogil=True, fastmath=FAST)
@@ -159,7 +174,7 @@ def bake_rows(points, rows, start, stop, out):  # type: ignore[no-untyped-def]
             out[i, j, 0], out[i, j, 1], out[i, j, 2] = points[r, 0, j], points[r, 1, j], points[r, 2, j]
 
 
-@njit(types.void(types.Array(types.int32, 2, "C"), I8), cache=True, nogil=True)
+@njit(types.void(OUT_I2, I8), cache=True, nogil=True)
 def lower_sites(sites, row):  # type: ignore[no-untyped-def]
     """Guides after `row` have one row less; children of `row` itself are about to be bound again."""
     for r in range(len(sites)):

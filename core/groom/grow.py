@@ -58,7 +58,7 @@ def grow(
         )
         uvs = None if mesh.uvs is None else mesh.uvs[rest.triangles.corners]
         children = Children(
-            places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, coat.points
+            places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, coat.points, workers.ranges
         )
     with stage("evaluate"):
         set_coat(children, groom, mesh, rest, frame)
@@ -89,7 +89,10 @@ def _bound(
     """Hairs bound to guides, once for these roots of both; combing does not come here."""
     skin = skin_at_rest(mesh, evaluator)
     site_triangle, site_weights = triangle_places(mesh, skin.triangles, roots)
-    return bind(skin.points, skin.triangles.vertices, site_triangle, site_weights, triangle, barycentric, seed)
+    return bind(
+        skin.points, skin.triangles.vertices, site_triangle, site_weights, triangle, barycentric, seed,
+        evaluator.workers,
+    )
 
 
 class Figures(NamedTuple):

@@ -43,7 +43,9 @@ def bind_coat(groom: Groom, mesh: Mesh, evaluator: Evaluator) -> CoatBinding:
     """The hairs of a groom bound to its guides; slow. For :meth:`LiveCoat.take_binding`."""
     places = places_of(groom, mesh, evaluator)
     triangles = skin_at_rest(mesh, evaluator).triangles
-    return CoatBinding(mesh, triangles, groom.guides, places.triangle, places.barycentric, groom.coat.seed)
+    return CoatBinding(
+        mesh, triangles, groom.guides, places.triangle, places.barycentric, groom.coat.seed, evaluator.workers
+    )
 
 
 class LiveCoat:
@@ -83,7 +85,7 @@ class LiveCoat:
         self._binding = bind_coat(groom, mesh, evaluator)
         uvs = None if mesh.uvs is None else mesh.uvs[rest.triangles.corners]
         self.children = Children(
-            *places, self._binding.binding(), rest.triangles.vertices, uvs, groom.coat.points
+            *places, self._binding.binding(), rest.triangles.vertices, uvs, groom.coat.points, evaluator.workers.ranges
         )
         n = len(self.children)
         self._owed = np.full(n, EVALUATE, np.uint8)

@@ -31,17 +31,23 @@ from core.mesh.intrinsic_points import (
     PHANTOM,
     SITE,
     find_place,
+    gather_points,
+    hang_again,
     hang_points,
     label_helpers,
-    read_all,
     read_changed,
+    read_faces,
+    sort_points,
 )
 from core.mesh.intrinsic_removal import remove_vertex, remove_vertices
 from core.mesh.intrinsic_star import LARGEST_RING, make_ring
 from core.random import rand
+from core.workers import Workers, serial_ranges
 
 FEWEST = 4  # a piece of skin needs this many vertices that stay
 HELPERS = 6  # or else keeps this many of the mesh's own
+WORTH_A_PART = 32_768  # points for which the triangulation is worth making once more
+MOST_PARTS = 4
 SPARE = 256  # sites that can be added before arrays grow
 
 
@@ -88,16 +94,19 @@ def _insert_sites(net, vertices, base):  # type: ignore[no-untyped-def]
 
 def bind(
     points: ArrayLike, triangles: ArrayLike, site_triangle: ArrayLike, site_barycentric: ArrayLike,
-    tracked_triangle: ArrayLike, tracked_barycentric: ArrayLike, seed: int = 0,
+    tracked_triangle: ArrayLike, tracked_barycentric: ArrayLike, seed: int = 0, workers: Workers | None = None,
 ) -> Binding:
     """Bind tracked points of a skin to sites on it; see :class:`SurfaceSites` for the parameters."""
     return SurfaceSites(
-        points, triangles, site_triangle, site_barycentric, tracked_triangle, tracked_barycentric, seed
+        points, triangles, site_triangle, site_barycentric, tracked_triangle, tracked_barycentric, seed, workers
     ).binding()
 
 
 class SurfaceSites:
     """The triangulation of the sites, kept so that one site can be added or taken away in well under a millisecond.
+
+    Many points are shared out among threads, each of which carries its own through a triangulation of its own; what
+    happens to the triangulation and to a point does not depend on other points, so neither does the result.
 
     Mutable and owned by an evaluator. Costs about 32 bytes for every tracked point while it is kept.
 
@@ -108,19 +117,21 @@ class SurfaceSites:
     site_triangle, site_barycentric : (G,) int and (G, 3) float, at least one site.
     tracked_triangle, tracked_barycentric : (N,) int and (N, 3) float.
     seed : order in which mesh vertices are taken out.
+    workers : threads to share the points out to.
     """
 
     def __init__(
         self, points: ArrayLike, triangles: ArrayLike, site_triangle: ArrayLike, site_barycentric: ArrayLike,
-        tracked_triangle: ArrayLike, tracked_barycentric: ArrayLike, seed: int = 0,
+        tracked_triangle: ArrayLike, tracked_barycentric: ArrayLike, seed: int = 0, workers: Workers | None = None,
     ) -> None:
         self._points = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
         self._triangles = np.ascontiguousarray(triangles, np.int32).reshape(-1, 3)
         self._seed = seed
+        self._threads, self._ranges = (1, serial_ranges) if workers is None else (workers.threads, workers.ranges)
         self._site_triangle = np.array(site_triangle, np.int32).reshape(-1)
         self._site_bary = np.array(site_barycentric, np.float64).reshape(-1, 3)
-        self._tracked_triangle = np.asarray(tracked_triangle, np.int32).reshape(-1)
-        self._tracked_bary = np.asarray(tracked_barycentric, np.float64).reshape(-1, 3)
+        self._tracked_triangle = np.ascontiguousarray(tracked_triangle, np.int32).reshape(-1)
+        self._tracked_bary = np.ascontiguousarray(tracked_barycentric, np.float64).reshape(-1, 3)
         self._ring = make_ring()
         self._build()
 
@@ -142,26 +153,38 @@ class SurfaceSites:
         given = np.argsort(keys, kind="stable").astype(np.int32)
         self._given = given  # inner point -> row as given; neighbours on the skin lie together
         self._count = len(given)
-        face, bary = self._on_skin(self._tracked_triangle[given], self._tracked_bary[given])
-        self._allocate(skin, self._count)
-        hang_points(self._net, face, bary, 0)
         home, bary = self._on_skin(self._site_triangle, self._site_bary)
-        vertex = np.arange(skin.vertices, skin.vertices + self.sites, dtype=np.int32)
-        hang_points(self._net, home, bary, self._count + skin.vertices)
-        self._vertex = vertex  # of each site
+        nets = self._allocate(skin, self._count)
+        self._net = nets[0]
+        self._vertex = np.arange(skin.vertices, skin.vertices + self.sites, dtype=np.int32)
         self._used_vertices = skin.vertices + self.sites
-        self._kind[vertex] = SITE
-        self._label[vertex] = np.arange(self.sites, dtype=np.int32)
+        self._kind[self._vertex] = SITE
+        self._label[self._vertex] = np.arange(self.sites, dtype=np.int32)
+        self._place_tracked()
+        leaving = self._leaving(skin, home)
+        orders = [leaving.copy() for _ in nets]
+        stuck = [0] * len(nets)
 
-        legalise_all(self._net)
-        _insert_sites(self._net, vertex, self._count)
-        self._remove_mesh(skin, home)
+        def lay_out(start: int, stop: int) -> None:
+            for part in range(start, stop):
+                net, own = nets[part], self._count + part * len(self._kind)
+                hang_again(net, self._count * part // len(nets), self._count * (part + 1) // len(nets))
+                hang_points(net, home, bary, own + skin.vertices)
+                legalise_all(net)
+                _insert_sites(net, self._vertex, own)
+                stuck[part] = remove_vertices(net, make_ring(), orders[part], own)
+
+        self._ranges(len(nets), lay_out, 1)
+        self._kind[orders[0][: stuck[0]]] = HELPER
+        if len(nets) > 1:
+            self._unite()
         self._net.changed[:] = 0
         self._net.tally[TOUCHED] = 0
         self._nearest_site: cKDTree | None = None
         self._relabel()
 
-    def _allocate(self, skin: Manifold, count: int) -> None:
+    def _allocate(self, skin: Manifold, count: int) -> list[Net]:
+        """The triangulation of the skin, once for every part of the points; the parts share the rows of points."""
         used = len(skin.origin) // 3
         room = self.sites + SPARE
         faces, vertices = used + 2 * room, skin.vertices + room
@@ -175,8 +198,9 @@ class SurfaceSites:
         free[: 2 * room] = np.arange(faces - 1, used - 1, -1)
         tally = np.zeros(4, np.int64)
         tally[FREE] = 2 * room
-        tracked = count + vertices
-        self._net = Net(
+        parts = max(1, min(self._threads, MOST_PARTS, count // WORTH_A_PART))
+        tracked = count + parts * vertices  # every part carries the vertices too
+        first_part = Net(
             origin, twin, length, first, np.full(faces, -1, np.int32), np.full(tracked, -1, np.int32),
             np.full(tracked, -1, np.int32), np.zeros((tracked, 3)), np.zeros(3 * faces, np.uint8),
             np.empty(3 * faces, np.int32), np.ones(faces, np.uint8), np.empty(faces, np.int32), free, tally,
@@ -185,6 +209,31 @@ class SurfaceSites:
         self._label = np.full(vertices, -1, np.int32)
         self._piece = np.zeros(vertices, np.int32)
         self._piece[: skin.vertices] = skin.component
+        shared = first_part.follow, first_part.home, first_part.bary
+        return [first_part] + [
+            Net(*(array if any(array is s for s in shared) else array.copy() for array in first_part))
+            for _ in range(1, parts)
+        ]
+
+    def _place_tracked(self) -> None:
+        """Write face and weights of the tracked points, in inner order."""
+        skin, net, given = self._skin, self._net, self._given
+        self._ranges(self._count, lambda start, stop: gather_points(
+            given, self._tracked_triangle, self._tracked_bary, skin.face, skin.flipped, start, stop, net.home, net.bary
+        ), 8192)
+        lost = np.flatnonzero(net.home[: self._count] < 0)
+        if len(lost):
+            net.home[lost], net.bary[lost] = self._on_skin(
+                self._tracked_triangle[given[lost]], self._tracked_bary[given[lost]]
+            )
+
+    def _unite(self) -> None:
+        """One net of all points, where several carried some each."""
+        kept = self._count + len(self._kind)
+        net = self._net
+        self._net = net = net._replace(follow=net.follow[:kept], home=net.home[:kept], bary=net.bary[:kept])
+        net.head[:] = -1
+        hang_again(net, 0, kept)
 
     def _on_skin(
         self, triangle: NDArray[np.int32], bary: NDArray[np.float64]
@@ -209,8 +258,9 @@ class SurfaceSites:
         bary[turned] = bary[turned][:, [0, 2, 1]]
         return face.astype(np.int32), np.ascontiguousarray(bary)
 
-    def _remove_mesh(self, skin: Manifold, site_face: NDArray[np.int32]) -> None:
-        """Take out every vertex of the mesh, in seeded order, except those a piece needs to stay a surface."""
+    def _leaving(self, skin: Manifold, site_face: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Every vertex of the mesh, in the seeded order they are taken out, but those a piece needs to stay a surface,
+        which become helpers."""
         mesh = np.arange(skin.vertices)
         loop = skin.vertices - len(skin.loops)
         phantom = (mesh >= loop) & ~np.concatenate([np.zeros(loop, bool), skin.filled])
@@ -232,11 +282,8 @@ class SurfaceSites:
             mine = np.flatnonzero(piece == c)
             keep[mine if sites[c] == 0 else mine[-HELPERS:]] = True
         self._kind[order[keep]] = HELPER
-        going = np.ascontiguousarray(order[~keep], np.int32)
-        stuck = remove_vertices(self._net, self._ring, going, self._count)
-        self._kind[going[:stuck]] = HELPER
-        self._stay = stay
-        self._stay += np.bincount(skin.component[order[keep]], minlength=skin.components)
+        self._stay = stay + np.bincount(skin.component[order[keep]], minlength=skin.components)
+        return np.ascontiguousarray(order[~keep], np.int32)
 
     def _net_vertex(self, face: NDArray[np.int32]) -> NDArray[np.int32]:
         """A mesh vertex of each face of the manifold as it was."""
@@ -366,7 +413,12 @@ class SurfaceSites:
         weights = np.empty((n, 3), np.float32)
         order = np.empty(n, np.int32)
         trouble = np.zeros(n, np.uint8)
-        read_all(self._net, self._kind, self._label, self._given, n, order, sites, weights, trouble)
+        net, given = self._net, self._given
+        ends, points = np.empty(len(net.head) + 2, np.int32), np.empty(n, np.int32)
+        sort_points(net.home, n, ends, points)
+        self._ranges(len(net.head) + 1, lambda start, stop: read_faces(
+            net, self._kind, self._label, given, ends, points, start, stop, order, sites, weights, trouble
+        ), 1024)
         lost = np.flatnonzero(trouble == 2)
         if len(lost):
             sites[lost] = self._nearest(lost)[:, None]

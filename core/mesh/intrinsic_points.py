@@ -10,6 +10,8 @@ from core.mesh.intrinsic_flips import B1, F1, F2, I1, NET, TOUCHED, area, touch
 _RI1 = types.Array(types.int32, 1, "C", readonly=True)
 _I2 = types.Array(types.int32, 2, "C")
 _S2 = types.Array(types.float32, 2, "C")
+_RF2 = types.Array(types.float64, 2, "C", readonly=True)
+_RB1 = types.Array(types.uint8, 1, "C", readonly=True)
 
 SITE, PHANTOM, HELPER = 1, 2, 3  # what a vertex that stays is
 
@@ -21,6 +23,39 @@ def hang_points(net, face, bary, start):  # type: ignore[no-untyped-def]
         p, f = start + i, face[i]
         net.home[p] = f
         net.bary[p, 0], net.bary[p, 1], net.bary[p, 2] = bary[i, 0], bary[i, 1], bary[i, 2]
+        if f >= 0:
+            net.follow[p] = net.head[f]
+            net.head[f] = p
+
+
+@njit(
+    types.void(_RI1, _RI1, _RF2, _RI1, _RB1, types.int64, types.int64, I1, F2), cache=True, nogil=True,
+    error_model="numpy",
+)
+def gather_points(given, triangle, bary, face, flipped, start, stop, home, out):  # type: ignore[no-untyped-def]
+    """Write face and weights on the manifold of points start .. stop, which are rows `given` of `triangle` and `bary`.
+
+    face, flipped : (T,) of the triangles.
+    """
+    for p in range(start, stop):
+        t = triangle[given[p]]
+        home[p] = face[t]
+        total = 0.0
+        for k in range(3):
+            w = bary[given[p], k]
+            out[p, k] = min(w, 1.7e308) if w > 0.0 else 0.0
+            total += out[p, k]
+        for k in range(3):
+            out[p, k] = out[p, k] / total if total > 0.0 else 1.0 / 3.0
+        if flipped[t] == 1:
+            out[p, 1], out[p, 2] = out[p, 2], out[p, 1]
+
+
+@njit(types.void(NET, types.int64, types.int64), cache=True, nogil=True)
+def hang_again(net, start, stop):  # type: ignore[no-untyped-def]
+    """Hang points start .. stop into their homes, where they have one."""
+    for p in range(stop - 1, start - 1, -1):  # backwards, so that lists run forwards
+        f = net.home[p]
         if f >= 0:
             net.follow[p] = net.head[f]
             net.head[f] = p
@@ -60,18 +95,14 @@ def label_helpers(net, kind, label, distance):  # type: ignore[no-untyped-def]
     return other
 
 
-@njit(
-    types.int64(NET, B1, I1, _RI1, types.int64, types.int64, types.int64, types.boolean, I1, _I2, _S2, B1),
-    cache=True, nogil=True,
-)
-def read_face(net, kind, label, given, count, f, at, packed, rows, sites, weights, trouble):  # type: ignore[no-untyped-def]
-    """Write the binding of the points of face `f`, the first as entry `at` of `rows`; returns the entry after the last.
+@njit(types.boolean(NET, B1, I1, types.int64, I1, I1), cache=True, nogil=True)
+def _name_corners(net, kind, label, f, name, place):  # type: ignore[no-untyped-def]
+    """The up to three sites of face `f`, and which of them each corner is (-1: none); True where a helper is one.
 
-    With `packed` a binding goes to the entry's place, else to the row the point was given in. Phantoms are dropped
-    and the rest renormalised, corners that are one site added up. `trouble`: 1 bound through a helper, 2 to nothing.
+    Phantoms are dropped, corners that are one site named once.
     """
-    place = np.full(3, -1, np.int64)  # which of the three sites each corner is
-    name = np.full(3, -1, np.int64)
+    name[:] = -1
+    place[:] = -1
     used, helper = 0, False
     for phantoms in range(2):
         for k in range(3):
@@ -87,61 +118,87 @@ def read_face(net, kind, label, given, count, f, at, packed, rows, sites, weight
                 if name[m] == s:
                     place[k] = m
                     break
-    p = net.head[f]
-    while p >= 0:
-        if p < count:
-            rows[at] = given[p]
-            row = at if packed else given[p]
-            w0, w1, w2 = 0.0, 0.0, 0.0
-            for k in range(3):
-                w = net.bary[p, k]
-                if place[k] == 0:
-                    w0 += w
-                elif place[k] == 1:
-                    w1 += w
-                elif place[k] == 2:
-                    w2 += w
-            total = w0 + w1 + w2
-            if total < 1e-12:
-                w0, w1, w2, total = 1.0, 0.0, 0.0, 1.0
-            sites[row, 0] = max(name[0], 0)
-            sites[row, 1] = max(name[1] if name[1] >= 0 else name[0], 0)
-            sites[row, 2] = max(name[2] if name[2] >= 0 else name[0], 0)
-            weights[row, 0], weights[row, 1], weights[row, 2] = w0 / total, w1 / total, w2 / total
-            trouble[row] = 2 if name[0] < 0 else (1 if helper else 0)
-            at += 1
-        p = net.follow[p]
-    return at
+    return helper
 
 
-@njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
-def read_all(net, kind, label, given, count, order, sites, weights, trouble):  # type: ignore[no-untyped-def]
-    """Write the binding of points 0 .. count, in given order, and the order sorted by face; how many have a face."""
-    at = 0
-    for f in range(len(net.head)):
-        if net.head[f] >= 0:
-            at = read_face(net, kind, label, given, count, f, at, False, order, sites, weights, trouble)
-    found = at
+@njit(types.void(NET, types.int64, types.int64, I1, I1, types.boolean, _I2, _S2, B1), cache=True, nogil=True)
+def _read_point(net, p, row, name, place, helper, sites, weights, trouble):  # type: ignore[no-untyped-def]
+    """Write the binding of point `p` to `row`. `trouble`: 1 bound through a helper, 2 to nothing."""
+    w0, w1, w2 = 0.0, 0.0, 0.0
+    for k in range(3):
+        w = net.bary[p, k]
+        if place[k] == 0:
+            w0 += w
+        elif place[k] == 1:
+            w1 += w
+        elif place[k] == 2:
+            w2 += w
+    total = w0 + w1 + w2
+    if total < 1e-12:
+        w0, w1, w2, total = 1.0, 0.0, 0.0, 1.0
+    sites[row, 0] = max(name[0], 0)
+    sites[row, 1] = max(name[1] if name[1] >= 0 else name[0], 0)
+    sites[row, 2] = max(name[2] if name[2] >= 0 else name[0], 0)
+    weights[row, 0], weights[row, 1], weights[row, 2] = w0 / total, w1 / total, w2 / total
+    trouble[row] = 2 if name[0] < 0 else (1 if helper else 0)
+
+
+@njit(types.void(I1, types.int64, I1, I1), cache=True, nogil=True)
+def sort_points(home, count, ends, points):  # type: ignore[no-untyped-def]
+    """Points 0 .. count face after face, those without one last; the ones of face f lie before ``ends[f + 1]``."""
+    faces = len(ends) - 2
+    ends[:] = 0
     for p in range(count):
-        if net.home[p] < 0:
-            row = given[p]
-            sites[row] = 0
-            weights[row, 0], weights[row, 1], weights[row, 2] = 1.0, 0.0, 0.0
-            trouble[row] = 2
+        ends[(home[p] if home[p] >= 0 else faces) + 1] += 1
+    at = 0
+    for f in range(faces + 1):
+        size = ends[f + 1]
+        ends[f + 1] = at
+        at += size
+    for p in range(count):
+        f = home[p] if home[p] >= 0 else faces
+        points[ends[f + 1]] = p
+        ends[f + 1] += 1
+
+
+@njit(types.void(NET, B1, I1, _RI1, I1, I1, types.int64, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
+def read_faces(net, kind, label, given, ends, points, start, stop, order, sites, weights, trouble):  # type: ignore[no-untyped-def]
+    """Write the binding of points of the faces start .. stop to the rows they were given in, and their rows to
+    `order`, sorted by face. One face more than there are is that of points that have none."""
+    name, place = np.empty(3, np.int32), np.empty(3, np.int32)
+    for f in range(start, stop):
+        if ends[f] == ends[f + 1]:
+            continue
+        helper = False
+        if f < len(net.head):
+            helper = _name_corners(net, kind, label, f, name, place)
+        else:
+            name[:] = -1
+            place[:] = -1
+        for at in range(ends[f], ends[f + 1]):
+            row = given[points[at]]
             order[at] = row
-            at += 1
-    return found
+            _read_point(net, points[at], row, name, place, helper, sites, weights, trouble)
 
 
 @njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
 def read_changed(net, kind, label, given, count, rows, sites, weights, trouble):  # type: ignore[no-untyped-def]
     """The same for the points of touched faces only, packed, and forget those faces; returns how many."""
+    name, place = np.empty(3, np.int32), np.empty(3, np.int32)
     at = 0
     for i in range(net.tally[TOUCHED]):
         f = net.touched[i]
         net.changed[f] = 0
-        if net.head[f] >= 0:
-            at = read_face(net, kind, label, given, count, f, at, True, rows, sites, weights, trouble)
+        if net.head[f] < 0:
+            continue
+        helper = _name_corners(net, kind, label, f, name, place)
+        p = net.head[f]
+        while p >= 0:
+            if p < count:
+                rows[at] = given[p]
+                _read_point(net, p, at, name, place, helper, sites, weights, trouble)
+                at += 1
+            p = net.follow[p]
     net.tally[TOUCHED] = 0
     return at
 

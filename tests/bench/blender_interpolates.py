@@ -45,9 +45,10 @@ def run() -> list[Row]:
         places = scatter(skin.points, triangles, HAIRS, workers=workers)
         marks.append(time.perf_counter())
         binding = bind(
-            skin.points, triangles, sites.triangle, sites.barycentric, places.triangle, places.barycentric
+            skin.points, triangles, sites.triangle, sites.barycentric, places.triangle, places.barycentric,
+            workers=workers,
         )
-        children = Children(places.triangle, places.barycentric, binding, triangles)
+        children = Children(places.triangle, places.barycentric, binding, triangles, ranges=workers.ranges)
         marks.append(time.perf_counter())
         update_roots(children, skin.points, skin.normals)
         evaluate(children, guides, normal.astype(np.float32), workers)

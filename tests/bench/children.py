@@ -61,7 +61,8 @@ def run() -> list[Row]:
     places = scatter(coat.skin, coat.triangles, 200_000, 0, workers=workers)
 
     def bound(where: Scatter) -> Children:
-        children = Children(*where, bind(coat.skin, coat.triangles, *coat.guides, *where), coat.triangles)
+        binding = bind(coat.skin, coat.triangles, *coat.guides, *where, workers=workers)
+        children = Children(*where, binding, coat.triangles, ranges=workers.ranges)
         update_roots(children, coat.skin, coat.normals)
         return children
 
