@@ -66,7 +66,7 @@ def even_subset(
     for level in range(MAX_LEVELS):
         if darts.accepted >= count or dry:
             break
-        found = waking(darts.wake, end, level, darts.active)
+        found = woken = waking(darts.wake, end, level, darts.active)
         # as many as the roots of this level will ask for
         while seen == 0 or seen < 1.25 * per_root * darts.accepted / SHRINK**2:
             if batch == len(ends):
@@ -79,7 +79,7 @@ def even_subset(
             darts.active[found : found + len(newcomers)] = newcomers
             found += len(newcomers)
             seen += len(newcomers)
-        darts.throw(found, level, _last_level(level, darts.accepted, count))
+        darts.throw(woken, found, level, _last_level(level, darts.accepted, count))
     n = darts.accepted
     return Subset(darts.chosen[:n].copy(), darts.levels[:n].copy(), dry)
 
@@ -115,9 +115,9 @@ class _Darts:
         self._mask = 0
         self._firsts, self._new_firsts = np.zeros(BLOCK + 1, np.int32), np.full(BLOCK, -1, np.int32)
 
-    def throw(self, count: int, level: int, last: int) -> None:
+    def throw(self, woken: int, count: int, level: int, last: int) -> None:
         """Make roots of the first `count` of the active candidates where they fit; the rest sleeps, most of them for
-        good when they lie too near for the level `last`."""
+        good when they lie too near for the level `last`. The first `woken` have slept before."""
         radius = FIRST_RADIUS * self._size * SHRINK**level
         cell = CELL * radius
         self._build_grid(cell)
@@ -126,10 +126,12 @@ class _Darts:
         at = radius, last_radius, self._size, level, self.wake, self.chosen, self.levels, self.accepted
 
         def test(start: int, stop: int) -> None:
-            test_candidates(
-                False, self.active, start, stop, *known, self._grid, self._grid_faces, self._firsts, self._links,
-                self._counts, cell, self._mask, *at,
-            )
+            # the same share of both, for those who slept fit more often, which takes a longer search to say
+            for begin, size in ((0, woken), (woken, count - woken)):
+                test_candidates(
+                    False, self.active, begin + size * start // count, begin + size * stop // count, *known,
+                    self._grid, self._grid_faces, self._firsts, self._links, self._counts, cell, self._mask, *at,
+                )
 
         self._ranges(count, test, GRAIN)
         self._new_counts[:] = 0
