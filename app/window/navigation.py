@@ -48,6 +48,7 @@ class Eye:
         self._corners: tuple[object, Array] | None = None
         self._front: tuple[Mesh, tuple[float, float, float]] | None = None
         self._looking: Mesh | None = None
+        self._given: Camera | None = None  # to a workspace without one
 
     @property
     def camera(self) -> Camera:
@@ -55,14 +56,28 @@ class Eye:
         cameras = self.desk.workspace.cameras
         if cameras:
             return cameras[0]
-        camera = frame_points(self.points(), self._direction("three-quarter"), self._aspect(), field_of_view=LENS)
-        camera = navigate.with_clipping(camera, self.corners())
+        camera = self._whole_view()
         if self.desk.document.meshes:
             if self.facing is None:
                 self._find_front()  # and this camera is only for as long as that takes
             else:
+                self._given = camera
                 self.desk.set_workspace(cameras=(camera,))
         return camera
+
+    def resized(self) -> None:
+        """The picture has another size: a camera that was given and not moved since sees everything again.
+
+        So the first view does not depend on how soon the window had its size.
+        """
+        cameras = self.desk.workspace.cameras
+        if cameras and cameras[0] is self._given:
+            self._given = self._whole_view()
+            self.desk.set_workspace(cameras=(self._given, *cameras[1:]))
+
+    def _whole_view(self) -> Camera:
+        camera = frame_points(self.points(), self._direction("three-quarter"), self._aspect(), field_of_view=LENS)
+        return navigate.with_clipping(camera, self.corners())
 
     def look(self, camera: Camera) -> None:
         """Look through a camera; near and far are put about what there is."""

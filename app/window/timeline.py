@@ -138,21 +138,22 @@ class Ruler(QWidget):
         widest = painter.fontMetrics().horizontalAdvance(str(max(abs(first), abs(last))) + "-")
         step = _step(last - first, int(self._extent()[1] / (widest + 3 * look.text)))
         minor = step // 2 if step % 2 == 0 else step // 5 if step % 5 == 0 else step
-        current = round(self.x_of(self._desk.workspace.frame))
+        left, span = self._extent()
+        current = min(max(round(self.x_of(self._desk.workspace.frame)), left), left + span)
+        wide = painter.fontMetrics().horizontalAdvance(_words(self._desk.workspace.frame))
         for frame in range(first, last + 1, max(1, minor)):
             large = (frame - first) % step == 0
             x = round(self.x_of(frame))
             height = (bottom - numbers) * (0.75 if large else 0.4)
             painter.fillRect(QRectF(x, bottom - 4 - height, 1.0, height),
                              look.theme.colour("dim" if large else "line", 0.7 if large else 1.0))
-            if large and abs(x - current) > 0.6 * widest:
+            if large and abs(x - current) > 0.5 * (wide + widest) + look.grid:
                 self._number(painter, frame, x, numbers, look.theme.colour("dim"))
 
     def _number(self, painter: QPainter, frame: float, x: float, height: float, colour: object) -> None:
         painter.setPen(colour)  # type: ignore[call-overload] # a QColor
-        words = f"{frame:g}" if abs(frame) < 1e5 else f"{frame:.0f}"
         painter.drawText(QRectF(x - 50, 0, 100, height), Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop,
-                         words)
+                         _words(frame))
 
     def _paint_clip(self, painter: QPainter, look: Look, bottom: float) -> None:
         left, span = self._extent()
@@ -193,7 +194,7 @@ class Ruler(QWidget):
             painter.setPen(look.theme.colour("accent", 0.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
-        self._number(painter, round(frame, 2), x, numbers, accent)
+        self._number(painter, frame, x, numbers, accent)
 
 
 class NumberField(QLineEdit):
@@ -325,6 +326,10 @@ class Timeline(QWidget):
     def _edit_range(self, first: float, last: float) -> None:
         first, last = sorted((round(first), round(last)))
         self._desk.edit("Frame range", set_document, first_frame=first, last_frame=last)
+
+
+def _words(frame: float) -> str:
+    return f"{round(frame, 2):g}" if abs(frame) < 1e5 else f"{frame:.0f}"
 
 
 def _step(frames: int, most: int) -> int:

@@ -350,6 +350,7 @@ class Viewport(QOpenGLWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Another size is another picture."""
         super().resizeEvent(event)
+        self.eye.resized()
         self.redraw()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from core.camera import Camera, project
 from core.document import Document
+from tests.documents import small_document
 from tests.window.conftest import Opened
 from tests.window.hand import ALT, CTRL, LEFT, MIDDLE, NONE, RIGHT, SHIFT, Hand
 
@@ -164,3 +165,28 @@ def test_a_kept_view_is_saved_and_comes_back(hand: Hand) -> None:
     hand.drag(BACK, ASIDE, MIDDLE)
     hand.window.commands.run("view.recall_1")
     assert np.allclose(camera(hand).world_from_camera, before.world_from_camera)
+
+
+def test_the_first_view_is_the_same_however_late_the_window_gets_its_size(opened: Opened) -> None:
+    hand = opened(small_document())  # wider than high
+    hand.rest()
+    first, size = camera(hand), hand.window.size()
+    resized(hand, 500, size.height())
+    assert not np.array_equal(camera(hand).world_from_camera, first.world_from_camera)
+    resized(hand, size.width(), size.height())
+    np.testing.assert_array_equal(camera(hand).world_from_camera, first.world_from_camera)
+
+
+def test_a_view_that_was_moved_stays_when_the_window_is_resized(hand: Hand) -> None:
+    hand.rest()
+    wheel(hand, BACK, 1)
+    moved = camera(hand)
+    resized(hand, 700, hand.window.height())
+    np.testing.assert_array_equal(camera(hand).world_from_camera, moved.world_from_camera)
+
+
+def resized(hand: Hand, width: int, height: int) -> None:
+    size, frames = hand.view.size(), hand.view.frames
+    hand.window.resize(width, height)
+    hand.until(lambda: hand.view.size() != size and hand.view.frames > frames)
+    hand.rest()
