@@ -32,7 +32,7 @@ def describe(path: Path) -> dict[str, Any]:
         return project.project_info(path)
     curves = _curves(path)
     if curves is not None:
-        return curve_file.curve_info(path)
+        return {**curve_file.curve_info(path), **_rig_beside_hair(path)}
     return _describe_mesh(path)
 
 
@@ -106,6 +106,16 @@ def draw_file(
         for g in visible_grooms(document)
     }
     draw(png, document, children, evaluator, size, view, skins=skins)
+
+
+def _rig_beside_hair(path: Path) -> dict[str, Any]:
+    """What moves, in a file that holds curves as well."""
+    if path.suffix.lower() not in rig_file.READ_SUFFIXES:
+        return {}
+    try:
+        return rig_file.rig_info(rig_file.read_rig(path))
+    except UserError:
+        return {}
 
 
 def _describe_mesh(path: Path) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from core.pose.edit_layers import sculpt_errors
 from core.pose.layers import Extracted, LayerReport, build
 from core.pose.pose_space import Correctives, PoseLayer
 from core.pose.refusal import Refusal
+from core.pose.rig import Rig
 from core.pose.solve import solve
 from core.pose.synthesis import evaluate, evaluate_at, prepare
 from core.record import freeze
@@ -51,9 +52,9 @@ def command(
             document, item = _read(rig, unit, up, report)
         if poses is not None:
             with report.stage("solve", "extracting and solving the poses"):
-                extracted = _built(poses, item, report)
+                rig_made, extracted = _built(poses, item, report)
+            item = item.replace(rig=rig_made, correctives=extracted.correctives)
             found = _figures(item, extracted)
-            item = item.replace(correctives=extracted.correctives)
             document = with_mesh(document, item)
         for path in outputs:
             with report.stage(f"export_{path.suffix.lstrip('.')}", f"writing {path.name}"):
@@ -108,12 +109,12 @@ def _read(path: Path, unit: str | None, up: str | None, report: Report) -> tuple
     return document, item
 
 
-def _built(path: Path, item: MeshObject, report: Report) -> Extracted:
+def _built(path: Path, item: MeshObject, report: Report) -> tuple[Rig, Extracted]:
     file = read_poses(path, item.rig)  # type: ignore[arg-type]
     for note in file.notes:
         report.note(note)
     try:
-        return build(item.mesh.points, item.rig, file.sculpts, **file.options)  # type: ignore[arg-type]
+        return file.rig, build(item.mesh.points, file.rig, file.sculpts, file.dofs, **file.options)
     except Refusal as error:
         if report.as_json:  # the names of the poses, for scripts
             sentence = str(error)

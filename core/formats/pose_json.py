@@ -7,7 +7,12 @@ POSES.json::
 
 POSE.json: ``{"controls": {...}}`` in the same form, or ``{"clip": "walk", "frame": 1012.5}``. Rotations are degrees
 about x, then y, then z of the joint at rest; translations (``"translate"``) metres in its parent. Falloffs are degrees
-for joints that turn, metres for joints that only move, and units for numbers.
+for joints that turn, metres for joints that only move, and units for numbers; or a list, one for each axis read.
+
+POSES.json may say more: ``"reads"``, what is read of a joint: ``{"elbow": "swing"}`` (twist, swing-twist, translation,
+or x, y, z for the turn about that axis alone); and ``"controls"``, abstract controls that the rig does not have yet:
+``{"happiness": {"low": -1, "high": 1}, "lid": {"joint": "eyelid", "axis": [0, 1, 0], "travel": 0.01}, "pad":
+{"vertices": [12, 13], "travel": 0.02}}``, whose vertices are those of the rig's file.
 """
 
 from __future__ import annotations
@@ -24,12 +29,14 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.formats.mesh_file import READ_SUFFIXES, read_mesh
 from core.formats.text_numbers import text_bytes
+from core.pose.controls import rotation_dof, translation_dof
 from core.pose.layers import Sculpt
 from core.pose.pose import Pose
-from core.pose.pose_space import REST_NAME, Kernel
-from core.pose.rig import Rig, clip_named, control_names, playing
+from core.pose.pose_space import FALLOFFS, REST_NAME, Dof, Kernel
+from core.pose.rig import Control, Rig, clip_named, control_names, playing
 from core.pose.rotation import quaternion_from_euler
 from core.pose.synthesis import pose_at
+from core.record import freeze
 
 LARGEST_JSON = 64 << 20  # bytes
 Three = tuple[float, float, float]
@@ -43,17 +50,31 @@ class Movement(msgspec.Struct, forbid_unknown_fields=True):
 
 
 Controls = dict[str, float | Movement]
+Read = Literal["swing", "twist", "swing-twist", "translation", "x", "y", "z"]
+FURTHER = ("poses", "controls", "reads")  # what of the file is no field of a pose space
 
 
 class _Sculpted(msgspec.Struct, forbid_unknown_fields=True):
     name: str
     controls: Controls
     sculpt: str | None = None
-    falloff: dict[str, float] = {}
+    falloff: dict[str, float | list[float]] = {}
+
+
+class _Control(msgspec.Struct, forbid_unknown_fields=True):
+    rest: float = 0.0
+    low: float = 0.0
+    high: float = 1.0
+    joint: str | None = None
+    vertices: list[int] | None = None
+    axis: Three = (0.0, 1.0, 0.0)
+    travel: float = 1.0
 
 
 class _Poses(msgspec.Struct, forbid_unknown_fields=True):
     poses: list[_Sculpted]
+    controls: dict[str, _Control] = {}
+    reads: dict[str, Read] = {}
     kernel: Kernel = "gaussian"
     normalise: Literal["none", "above-one", "always"] = "none"
     affine: bool = False
@@ -70,9 +91,14 @@ class _Moment(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class PoseFile(NamedTuple):
-    """Sculpts at poses of a rig, and the fields of their pose spaces; notes are sentences to show."""
+    """Sculpts at poses of a rig, and the fields of their pose spaces; notes are sentences to show.
 
+    rig : with the abstract controls that the file adds. dofs : what it picks to be read.
+    """
+
+    rig: Rig
     sculpts: tuple[Sculpt, ...]
+    dofs: tuple[Dof, ...]
     options: dict[str, Any]
     notes: tuple[str, ...]
 
@@ -98,6 +124,9 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise UserError(f"{path.name} has the pose {twice[0]!r} more than once; give every pose a name of its own.")
+    rig = _with_controls(said.controls, rig, path.name)
+    dofs = _dofs(said.reads, rig, path.name)
+    picked = {dof.control: dof for dof in dofs}
     sculpts, notes = [], []
     for item in said.poses:
         where = f"{path.name}, pose {item.name!r}"
@@ -107,18 +136,25 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
         falloffs = {}
         for control, reach in item.falloff.items():
             _check_control(control, rig, where)
-            if not 1e-6 <= reach <= 1e6:
-                raise UserError(f"{where}: the falloff of {control!r} must be above 0, not {reach:g}.")
+            each = tuple(reach) if isinstance(reach, list) else (reach,)
+            if not each or not all(1e-6 <= one <= 1e6 for one in each):
+                raise UserError(f"{where}: the falloff of {control!r} must be above 0, not {reach}.")
             if control not in {*pose.rotations, *pose.translations, *pose.numbers}:
                 notes.append(f"{where}: the falloff of {control!r} has no effect, for the pose does not set it.")
                 continue
-            falloffs[control] = (math.radians(reach) if control in pose.rotations else reach,)
+            turning = control in pose.rotations
+            kind = picked[control].kind if control in picked else "swing-twist" if turning else "translation"
+            kind = "number" if control in pose.numbers else kind
+            if len(each) not in (1, FALLOFFS[kind]):
+                raise UserError(
+                    f"{where}: the falloff of {control!r} must be one number, or {FALLOFFS[kind]} for {kind}.")
+            falloffs[control] = tuple(math.radians(one) for one in each) if turning else each
         target = None if item.sculpt is None else read_sculpt(path.parent / item.sculpt, rig, where)
         sculpts.append(Sculpt(pose, target, falloffs))
-    fields = [name for name in _Poses.__struct_fields__ if name != "poses"]
+    fields = [name for name in _Poses.__struct_fields__ if name not in FURTHER]
     if not 0.0 <= said.smoothing <= 1e3 or not 0 <= said.weighted <= 64 or said.table not in (0, *range(2, 65537)):
         raise UserError(f"{path.name}: smoothing goes from 0 to 1000, weighted from 0 to 64, table from 2 to 65536.")
-    return PoseFile(tuple(sculpts), {name: getattr(said, name) for name in fields}, tuple(notes))
+    return PoseFile(rig, tuple(sculpts), dofs, {name: getattr(said, name) for name in fields}, tuple(notes))
 
 
 def read_moment(path: Path, rig: Rig) -> Moment:
@@ -176,6 +212,41 @@ def read_sculpt(path: Path, rig: Rig, where: str) -> NDArray[np.float64]:
     if not count.all():
         raise UserError(f"{where}: the rig has vertices that its file does not have; read the rig again.")
     return np.asarray(total / count[:, None], np.float64)
+
+
+def _with_controls(said: dict[str, _Control], rig: Rig, where: str) -> Rig:
+    """The rig with these abstract controls; one that it has is replaced where it is a plain number."""
+    shapes = () if rig.shapes is None else rig.shapes.names
+    controls = {control.name: control for control in rig.controls}
+    there = np.arange(len(rig.skin.joints)) if rig.file_vertices is None else rig.file_vertices
+    for name, one in said.items():
+        if name in rig.skeleton.names or (name in shapes and (one.joint or one.vertices)):
+            raise UserError(f"{where}: {name!r} is a joint or a shape of the rig; give the control another name.")
+        if one.joint is not None and one.vertices is not None:
+            raise UserError(f"{where}: the control {name!r} follows a joint or vertices, not both.")
+        piece = None
+        if one.vertices is not None:
+            if not all(0 <= v < len(there) for v in one.vertices):
+                raise UserError(f"{where}: the control {name!r} names a vertex that the rig's file does not have.")
+            piece = freeze(np.unique(there[np.array(one.vertices, np.int64)]).astype(np.int32))
+        try:
+            controls[name] = Control(
+                name=name, kind="number" if one.joint is None and piece is None else "joint" if piece is None else
+                "geometry", rest=one.rest, low=one.low, high=one.high, vertices=piece, joint=one.joint, axis=one.axis,
+                travel=one.travel)
+            rig = rig.replace(controls=tuple(controls.values()))
+        except ValueError as error:
+            raise UserError(f"{where}: {error}.") from None
+    return rig
+
+
+def _dofs(reads: dict[str, Read], rig: Rig, where: str) -> tuple[Dof, ...]:
+    dofs = []
+    for joint, read in reads.items():
+        if joint not in rig.skeleton.names:
+            raise UserError(f"{where}: \"reads\" names {joint!r}, which is no joint of the rig.")
+        dofs.append(translation_dof(joint) if read == "translation" else rotation_dof(rig.skeleton, joint, read))
+    return tuple(dofs)
 
 
 def _obj_points(path: Path) -> NDArray[np.float64]:

@@ -48,8 +48,8 @@ POSES = [
 ]
 
 
-def build(folder, poses, *extra, kernel="gaussian"):
-    (folder / "poses.json").write_text(json.dumps({"kernel": kernel, "poses": poses}))
+def build(folder, poses, *extra, kernel="gaussian", **more):
+    (folder / "poses.json").write_text(json.dumps({"kernel": kernel, "poses": poses, **more}))
     return filoplume("pose", folder / "arm.glb", "--poses", folder / "poses.json", *extra, "--json")
 
 
@@ -129,6 +129,7 @@ def test_refusals_name_the_poses(folder):
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "sculpt": "short.obj"}, "1 vertices"),
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "falloff": {"elbow": 0}}, "falloff"),
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "falloff": {"knee": 3}}, "knee"),
+    ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "falloff": {"elbow": [3, 3]}}, "falloff"),
     ({"controls": {}, "name": "rest"}, "'rest'"),
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "colour": 1}, "colour"),
 ], ids=str)
@@ -139,6 +140,38 @@ def test_what_is_wrong_with_a_pose_is_said_in_one_sentence(folder, pose, words):
     said = json.loads(done.stdout)["error"]
     assert words in said
     assert "fault of filoplume" not in said
+
+
+def test_dials_of_ones_own_and_what_is_read_of_a_joint(folder):
+    """A dial, a switch that is a joint, and an elbow of which the swing alone counts, each with its own falloff."""
+    controls = {"strain": {"low": 0, "high": 2}, "reach": {"joint": "wrist", "axis": [0, 1, 0], "travel": 0.1}}
+    poses = [
+        {"name": "strained", "controls": {"strain": 1.0}, "sculpt": "bent.obj", "falloff": {"strain": 0.5}},
+        {**POSES[0], "falloff": {"elbow": [60, 20]}},
+    ]
+    done = build(folder, poses, "-o", folder / "dials.filo", controls=controls, reads={"elbow": "swing"})
+    assert done.returncode == 0, done.stdout
+    info = json.loads(filoplume("info", folder / "dials.filo", "--json").stdout)
+    assert {"strain", "reach", "elbow"} <= set(info["controls"])
+    assert np.abs(surface(folder, {"controls": {"strain": 1.0}}, "dials.filo") - read_points(folder / "bent.obj")
+                  ).max() < 1e-6
+    bent = surface(folder, {"controls": {"elbow": {"rotate": [0, 0, 110]}}}, "dials.filo")
+    assert np.abs(bent - read_points(folder / "bent.obj")).max() < 1e-6
+    layers = read_project(folder / "dials.filo").document.meshes[0].correctives.layers
+    assert {d.kind for layer in layers for d in layer.space.dofs if d.control == "elbow"} == {"swing"}
+
+
+@pytest.mark.parametrize(("more", "words"), [
+    ({"controls": {"elbow": {}}}, "'elbow'"), ({"controls": {"a": {"low": 2}}}, "range"),
+    ({"controls": {"a": {"joint": "knee"}}}, "joint"), ({"controls": {"a": {"vertices": [10**9]}}}, "vertex"),
+    ({"controls": {"a": {"vertices": []}}}, "vertex"), ({"reads": {"knee": "swing"}}, "knee"),
+    ({"reads": {"elbow": "shake"}}, "shake"), ({"controls": {"a": {"joint": "elbow", "vertices": [1]}}}, "not both"),
+], ids=str)
+def test_a_dial_that_cannot_be_is_said_in_one_sentence(folder, more, words):
+    done = build(folder, [], "-o", folder / "no.filo", **more)
+    assert done.returncode == 1
+    assert words in json.loads(done.stdout)["error"]
+    assert "fault of filoplume" not in done.stdout
 
 
 def test_wrong_use_and_other_outputs(folder, tmp_path):

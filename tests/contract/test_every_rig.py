@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
+from app.files import describe
 from core.errors import UserError
 from core.formats.rig_assembly import NoRig
 from core.formats.rig_file import READ_SUFFIXES, read_rig
@@ -112,6 +113,12 @@ def test_every_clip_is_as_the_specification_says(name):
             assert np.abs(points - truth).max() <= 1e-5 * np.ptp(truth, axis=0).max()
             moved = max(moved, np.abs(points - in_file_order(rig, found.mesh.points)).max())
         assert moved > 1e-3
+
+
+def test_hair_beside_a_rig_does_not_hide_its_controls():
+    found = describe(BAKE / "dqs.usda")
+    assert found["kind"] == "groom"
+    assert found["controls"] == ["joint1", "joint2", "joint3"]
 
 
 def test_a_foxs_seams_are_welded_and_its_own_order_is_kept():
