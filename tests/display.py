@@ -14,10 +14,15 @@ SIZE = "1920x1200x24"
 
 
 def ensure_display() -> str | None:
-    """See to it that windows can be opened. None when they can, else why only "offscreen" ones can be."""
-    if os.environ.get("DISPLAY") or os.environ.get("QT_QPA_PLATFORM"):
-        return None if os.environ.get("QT_QPA_PLATFORM") != "offscreen" else "windows are offscreen"
+    """See to it that windows can be opened. None when they can, else why only "offscreen" ones can be.
+
+    Workers of pytest-xdist never share a display: their windows would take the focus from each other.
+    """
     server = shutil.which("Xvfb")
+    if os.environ.get("QT_QPA_PLATFORM"):
+        return None if os.environ["QT_QPA_PLATFORM"] != "offscreen" else "windows are offscreen"
+    if os.environ.get("DISPLAY") and not (server and "PYTEST_XDIST_WORKER" in os.environ):
+        return None
     if server is None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         return "there is no display and no Xvfb: sudo apt install xvfb openbox"
