@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -11,10 +13,14 @@ from numpy.typing import NDArray
 from core.mesh.mesh import Mesh, Triangles
 from core.mesh.normals import edge, mesh_normals
 from core.mesh.roots import Roots
+from core.workers import serial_ranges
+
+Ranges = Callable[..., None]
 
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 I32_2D = types.Array(types.int32, 2, "C", readonly=True)
+U32_2D = types.Array(types.uint32, 2, "C", readonly=True)
 
 
 def place_roots(
@@ -160,6 +166,44 @@ def rest_from_posed(
     return out
 
 
+class Carried(NamedTuple):
+    """The same strands on a deformed skin and at rest, (N, P, 3) float32 each."""
+
+    posed: NDArray[np.float32]
+    rest: NDArray[np.float32]
+
+
+def rest_from_posed_again(
+    now: NDArray[np.float32],
+    last: Carried,
+    start: Carried,
+    posed_frames: NDArray[np.float32],
+    rest_frames: NDArray[np.float32],
+    ranges: Ranges = serial_ranges,
+) -> NDArray[np.float32]:
+    """:func:`rest_from_posed` while strands are edited again and again: only what changed is carried.
+
+    Parameters
+    ----------
+    now : (N, P, 3) float32 on the deformed skin.
+    last : the newest that belong together: strands that kept their bits since keep those at rest.
+    start : as they were before the first edit, their first points at the roots: strands that came back to their bits
+        there have those at rest again, and all of them have their roots.
+    posed_frames, rest_frames : (N, 3, 3) float32, frames at the roots.
+    """
+    now = np.ascontiguousarray(now, np.float32)
+    out = np.empty(now.shape, np.float32)
+
+    def bits(points: NDArray[np.float32]) -> NDArray[np.uint32]:
+        return points.reshape(len(points), -1).view(np.uint32)
+
+    rows = bits(now), bits(start.posed), bits(start.rest), bits(last.posed), bits(last.rest)
+    ranges(len(now), lambda first, stop: _carry_changed(
+        now, start.posed, start.rest, posed_frames, rest_frames, *rows, first, stop, out, bits(out)
+    ))
+    return out
+
+
 @njit(types.void(F32_2D, I32_2D, F32_2D, types.float32[:, ::1]), cache=True, nogil=True)
 def _blend(points, vertices, weights, out):  # type: ignore[no-untyped-def]
     for i in range(len(vertices)):
@@ -290,19 +334,67 @@ def _deformed_frames(rest, points, normals, vertices, weights, stored, frames): 
             _write_frame(frames, i, tx, ty, tz, nx, ny, nz)
 
 
+@njit(cache=True, inline="always")
+def _turn_row(frames_rest, frames_moved, i, r):  # type: ignore[no-untyped-def]
+    """Row r of the rotation from frame i at rest to the moved one."""
+    a, b, c = 0.0, 0.0, 0.0
+    for k in range(3):
+        m = np.float64(frames_moved[i, k, r])
+        a += m * frames_rest[i, k, 0]
+        b += m * frames_rest[i, k, 1]
+        c += m * frames_rest[i, k, 2]
+    return a, b, c
+
+
+@njit(cache=True, inline="always")
+def _carry_one(strands, i, rest, moved, frames_rest, frames_moved, out):  # type: ignore[no-untyped-def]
+    """Strand i from root `rest` to root `moved`, both (3,), turned from one frame to the other."""
+    x0, y0, z0 = np.float64(rest[0]), np.float64(rest[1]), np.float64(rest[2])
+    x1, y1, z1 = np.float64(moved[0]), np.float64(moved[1]), np.float64(moved[2])
+    a0, a1, a2 = _turn_row(frames_rest, frames_moved, i, 0)
+    b0, b1, b2 = _turn_row(frames_rest, frames_moved, i, 1)
+    c0, c1, c2 = _turn_row(frames_rest, frames_moved, i, 2)
+    for p in range(strands.shape[1]):
+        x, y, z = strands[i, p, 0] - x0, strands[i, p, 1] - y0, strands[i, p, 2] - z0
+        out[i, p, 0] = x1 + (a0 * x + a1 * y + a2 * z)
+        out[i, p, 1] = y1 + (b0 * x + b1 * y + b2 * z)
+        out[i, p, 2] = z1 + (c0 * x + c1 * y + c2 * z)
+
+
 @njit(types.void(F32_3D, F32_2D, F32_2D, F32_3D, F32_3D, types.float32[:, :, ::1]), cache=True, nogil=True)
 def _carry(strands, rest, moved, frames_rest, frames_moved, out):  # type: ignore[no-untyped-def]
-    turn = np.empty((3, 3), np.float64)
     for i in range(len(strands)):
-        for r in range(3):
-            for c in range(3):
-                total = 0.0
-                for k in range(3):
-                    total += np.float64(frames_moved[i, k, r]) * frames_rest[i, k, c]
-                turn[r, c] = total
-        for p in range(strands.shape[1]):
-            x = np.float64(strands[i, p, 0]) - rest[i, 0]
-            y = np.float64(strands[i, p, 1]) - rest[i, 1]
-            z = np.float64(strands[i, p, 2]) - rest[i, 2]
-            for r in range(3):
-                out[i, p, r] = moved[i, r] + (turn[r, 0] * x + turn[r, 1] * y + turn[r, 2] * z)
+        _carry_one(strands, i, rest[i], moved[i], frames_rest, frames_moved, out)
+
+
+@njit(cache=True, inline="always")
+def _same_bits(a, b, i):  # type: ignore[no-untyped-def]
+    # One OR over the row and a single branch: an early way out would cost the vector instructions.
+    bits = np.uint32(0)
+    for k in range(a.shape[1]):
+        bits |= a[i, k] ^ b[i, k]
+    return bits == 0
+
+
+@njit(
+    types.void(
+        F32_3D, F32_3D, F32_3D, F32_3D, F32_3D, U32_2D, U32_2D, U32_2D, U32_2D, U32_2D, types.int64, types.int64,
+        types.float32[:, :, ::1], types.uint32[:, ::1]
+    ),
+    cache=True, nogil=True,
+)
+def _carry_changed(  # type: ignore[no-untyped-def]
+    now, shown, before, frames_shown, frames_before, now_bits, shown_bits, before_bits, last_bits, last_rest_bits,
+    start, stop, out, out_bits
+):
+    for i in range(start, stop):
+        if _same_bits(now_bits, last_bits, i):
+            for k in range(out_bits.shape[1]):
+                out_bits[i, k] = last_rest_bits[i, k]
+        elif _same_bits(now_bits, shown_bits, i):
+            for k in range(out_bits.shape[1]):
+                out_bits[i, k] = before_bits[i, k]
+        else:
+            _carry_one(now, i, shown[i, 0], before[i, 0], frames_shown, frames_before, out)
+            for k in range(3):
+                out[i, 0, k] = before[i, 0, k]

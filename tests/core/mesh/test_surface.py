@@ -6,13 +6,16 @@ from scipy.spatial.transform import Rotation
 from core.mesh.mesh import Mesh, Triangles
 from core.mesh.roots import Roots
 from core.mesh.surface import (
+    Carried,
     place_roots,
     rest_from_posed,
+    rest_from_posed_again,
     root_frames,
     root_normals,
     root_positions,
     strands_on_deformed,
 )
+from core.workers import Workers
 
 
 def _skin(uvs: bool = True) -> tuple[Mesh, Triangles]:
@@ -124,6 +127,34 @@ def test_posed_strands_go_back_to_rest_and_rest_to_posed(uvs: bool, stretch: tup
     edited[:, 1:] += (random.normal(size=(500, 5, 3)) * 0.1).astype(np.float32)
     again = strands_on_deformed(mesh, roots, rest_from_posed(mesh, roots, edited, moved), moved)
     assert np.abs(again - edited).max() < 1e-6 * diagonal
+
+
+def test_only_what_changed_since_the_last_preview_is_carried_back() -> None:
+    mesh, triangles = _skin()
+    roots, _, _ = _roots(mesh, triangles)
+    random = np.random.default_rng(1)
+    skin = (mesh.points @ Rotation.random(random_state=1).as_matrix().T).astype(np.float32)
+    roots_at_rest = root_positions(mesh, roots)
+    strands = (roots_at_rest[:, None] + random.normal(size=(500, 6, 3)) * 0.2).astype(np.float32)
+    strands[:, 0] = roots_at_rest
+    start = Carried(strands_on_deformed(mesh, roots, strands, skin), strands)
+    frames = root_frames(mesh, roots, skin), roots.frames
+    # rows that nothing can have made by carrying: the last preview's are kept where nothing moved since
+    last = Carried(start.posed + np.float32(1), np.full_like(strands, 7))
+    now = last.posed.copy()
+    edited, undone = np.arange(100, 200), np.arange(300, 320)
+    now[edited, 1:] += np.float32(0.25)
+    now[undone] = start.posed[undone]
+    workers = Workers(3)
+    found = rest_from_posed_again(now, last, start, *frames, lambda n, call: workers.ranges(n, call, 50))
+    workers.close()
+    np.testing.assert_array_equal(found, rest_from_posed_again(now, last, start, *frames))
+    carried = rest_from_posed(mesh, roots, now, skin)
+    np.testing.assert_allclose(found[edited, 1:], carried[edited, 1:], atol=1e-5)
+    np.testing.assert_array_equal(found[edited, 0], strands[edited, 0])
+    np.testing.assert_array_equal(found[undone], strands[undone])
+    kept = np.delete(np.arange(500), np.concatenate([edited, undone]))
+    np.testing.assert_array_equal(found[kept], last.rest[kept])
 
 
 def test_rest_is_rest() -> None:
