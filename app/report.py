@@ -48,6 +48,11 @@ class Report:
             if self._bar:
                 self._bar.advance(self._task)
 
+    def words(self, words: str) -> None:
+        """Say beside the bar what goes on in the stage at hand."""
+        if self._bar:
+            self._bar.update(self._task, description=words)
+
     def note(self, words: str) -> None:
         """A word the person should read; never on standard output when that carries JSON."""
         if self._bar:

@@ -111,10 +111,9 @@ def run_bounded(
 
 
 def _run_child(request: bytes, what: str, seconds: float, cancel: Callable[[], bool] | None) -> int:
-    paths = [os.path.abspath(p) for p in (str(Path(__file__).resolve().parents[2]), *sys.path)]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     child = subprocess.Popen(  # our own interpreter and fixed words
-        [sys.executable, "-I", "-c", BOOT, *dict.fromkeys(paths)],
+        [sys.executable, "-I", "-c", BOOT, *child_paths()],
         stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment,
     )  # fmt: skip
     deadline = time.monotonic() + seconds
@@ -138,6 +137,11 @@ def _run_child(request: bytes, what: str, seconds: float, cancel: Callable[[], b
         if child.poll() is None:
             child.kill()
             child.wait()
+
+
+def child_paths() -> list[str]:
+    """Where a child process finds this program and its libraries."""
+    return list(dict.fromkeys(os.path.abspath(p) for p in (str(Path(__file__).resolve().parents[2]), *sys.path)))
 
 
 def _obituary(what: str, code: int) -> str:
@@ -186,7 +190,7 @@ def _receive(path: Path, what: str) -> dict[str, Any]:
 def child_main() -> None:
     """Entry of the child process: read the request, set the limits, call, answer."""
     request = msgspec.json.decode(sys.stdin.buffer.read(), type=Request)
-    _limit(request.seconds, request.memory)
+    bound_process(request.seconds, request.memory)
     arrays: dict[str, NDArray[Any]] = {}
     try:
         module, _, name = request.target.partition(":")
@@ -225,7 +229,7 @@ def _send(path: Path, answer: Answer, arrays: dict[str, NDArray[Any]]) -> None:
     beside.rename(path)
 
 
-def _limit(seconds: float, memory: int) -> None:
+def bound_process(seconds: float, memory: int) -> None:
     """Bound address space, processor time and file size; no core dump; end with the parent where we can."""
     if sys.platform == "linux":
         import ctypes

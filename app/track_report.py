@@ -1,0 +1,161 @@
+"""The report of a tracking run: one page that needs nothing beside it, with a picture, curves and patterns."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.image.mix import to_float
+from core.image.plate import Plate
+from core.match.track import Track, TrackSettings
+
+MOST_TRACKS = 200
+WIDE, HIGH = 260, 48
+STYLE = """
+body{font:14px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:1180px;padding:0 1rem;color:#1c1d20;background:#fff}
+h1{font-size:1.4rem;margin:0 0 .2rem} .sub{color:#666;margin:0 0 1rem} table{border-collapse:collapse;width:100%}
+th{font-weight:600;text-align:left;color:#555} td,th{padding:.35rem .6rem;border-bottom:1px solid #e6e6e8;vertical-align:middle}
+td.n{text-align:right;font-variant-numeric:tabular-nums} img.p{width:63px;height:63px;image-rendering:pixelated;display:block}
+.pics{display:flex;gap:4px} svg{display:block} .note{background:#fff6e0;padding:.4rem .7rem;border-radius:4px;margin:.2rem 0}
+img.f{width:100%;height:auto;border-radius:4px}
+@media(prefers-color-scheme:dark){body{background:#1b1c1f;color:#e4e4e6}td,th{border-color:#33343a}th,.sub{color:#a0a0a6}
+.note{background:#3a3220}}
+"""
+Read = Callable[[int], NDArray[Any] | None]
+
+
+def write_report(
+    path: Path, plate: Plate, tracks: tuple[Track, ...], settings: TrackSettings, read: Read, warnings: list[str]
+) -> None:
+    """Write the page; tracks come worst first, by the greatest standard deviation a frame of theirs has."""
+    order = sorted(tracks, key=_worst, reverse=True)
+    shown = order[:MOST_TRACKS]
+    frames = sorted({int(f) for track in shown for f in (track.keys[0, 0], track.frames[-1])} & set(plate.frames))
+    patterns = _patterns(shown, frames, read, settings.pattern)
+    middle = plate.frames[len(plate.frames) // 2]
+    rows = "".join(_row(track, plate.frames, patterns) for track in shown)
+    lost = sum(1 for track in tracks if track.frames[-1] < plate.last)
+    more = (
+        f"<p class=sub>{len(order) - len(shown)} better tracks are not listed.</p>" if len(order) > len(shown) else ""
+    )
+    page = f"""<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content="width=device-width">
+<title>{escape(plate.name)}: tracks</title><style>{STYLE}</style>
+<h1>{escape(plate.name)}</h1>
+<p class=sub>{len(tracks)} tracks, {sum(len(t.frames) for t in tracks):,} points, {lost} end before the plate does;
+frames {plate.first} to {plate.last}, {plate.width} x {plate.height} pixels; pattern {settings.pattern}, model {escape(settings.model)}</p>
+{"".join(f"<p class=note>{escape(words)}</p>" for words in warnings[:50])}
+{_overview(tracks, middle, read)}
+<p class=sub>Frame {middle} with the tails of 10 frames. Green is sure, red is not: a standard deviation of 0.5 px and more.</p>
+<table><tr><th>track<th>frames<th>worst<th>pattern at key and end<th>motion x, y<th>standard deviation, px<th>score</tr>
+{rows}</table>{more}</html>"""
+    path.write_text(page, encoding="utf-8")
+
+
+def _deviation(track: Track) -> NDArray[np.float64]:
+    return np.sqrt(np.maximum((track.covariance[:, 0] + track.covariance[:, 2]) / 2.0, 0.0))
+
+
+def _worst(track: Track) -> float:
+    return float(_deviation(track).max(initial=0.0))
+
+
+def _row(track: Track, span: range, patterns: dict[tuple[int, int], str]) -> str:
+    deviation = _deviation(track)
+    k = int(np.argmax(deviation))
+    moved = track.points - track.points[0]
+    ends = (int(track.keys[0, 0]), int(track.frames[-1]))
+    pictures = "".join(
+        f'<img class=p alt="frame {f}" src="{patterns[track.id, f]}">' for f in ends if (track.id, f) in patterns
+    )
+    return (
+        f"<tr><td>{escape(track.name)}<td class=n>{track.frames[0]}&ndash;{track.frames[-1]}"
+        f"<td class=n>{deviation[k]:.3f} px<br>frame {track.frames[k]}<td><div class=pics>{pictures}</div>"
+        f"<td>{_curves(track, span, (moved[:, 0], moved[:, 1]), ('#d04a3a', '#3a8a4a'))}"
+        f"<td>{_curves(track, span, (deviation,), ('#3a6fd0',), 0.0)}<td>{_curves(track, span, (track.score,), ('#8a5ad0',), 0.0, 1.0)}"
+    )
+
+
+def _curves(
+    track: Track,
+    span: range,
+    curves: tuple[NDArray[np.float64], ...],
+    colours: tuple[str, ...],
+    low: float | None = None,
+    high: float | None = None,
+) -> str:
+    """Curves over the frames of the plate as SVG; a gap where the track has none. The range stands at the left."""
+    low = min(float(c.min()) for c in curves) if low is None else low
+    high = max(float(c.max()) for c in curves) if high is None else high
+    scale = (HIGH - 6) / max(high - low, 1e-9)
+    parts = []
+    for values, colour in zip(curves, colours, strict=True):
+        words, before = [], None
+        for frame, value in zip(track.frames, values, strict=True):
+            x = (int(frame) - span[0]) / max(len(span) - 1, 1) * WIDE
+            words.append(f"{'L' if before == frame - 1 else 'M'}{x:.1f} {HIGH - 3 - (value - low) * scale:.1f}")
+            before = frame
+        parts.append(f'<path d="{"".join(words)}" fill=none stroke="{colour}" stroke-width=1.3 stroke-linecap=round />')
+    text = f"<text x=2 y=9 font-size=9 fill=#888>{high:.3g}</text><text x=2 y={HIGH - 1} font-size=9 fill=#888>{low:.3g}</text>"
+    return f'<svg width={WIDE} height={HIGH} viewBox="0 0 {WIDE} {HIGH}" role=img>{"".join(parts)}{text}</svg>'
+
+
+def _overview(tracks: tuple[Track, ...], frame: int, read: Read) -> str:
+    pixels = read(frame)
+    if pixels is None:
+        return ""
+    image = np.ascontiguousarray(_bytes(pixels))
+    size = max(1, round(image.shape[1] / 640))
+    for track in tracks:
+        near = np.flatnonzero((track.frames <= frame) & (track.frames > frame - 10))
+        if not len(near):
+            continue
+        bad = min(1.0, float(_deviation(track)[near[-1]]) / 0.5)
+        colour = (round(60 + 40 * (1 - bad)), round(60 + 160 * (1 - bad)), round(70 + 170 * bad))
+        tail = np.round(track.points[near] * 16).astype(np.int32).reshape(-1, 1, 2)
+        cv2.polylines(image, [tail], False, colour, size, cv2.LINE_AA, 4)
+        if track.frames[near[-1]] == frame:
+            cv2.circle(image, tuple(int(v) for v in tail[-1, 0]), 4 * size * 16, colour, size, cv2.LINE_AA, 4)
+    return f'<img class=f alt="frame {frame} with its tracks" src="{_picture(image, ".jpg")}">'
+
+
+def _patterns(tracks: list[Track], frames: list[int], read: Read, pattern: int) -> dict[tuple[int, int], str]:
+    """Pictures of the patterns by track and frame, around the point itself."""
+    found = {}
+    for frame in frames:
+        wanted = [
+            (t, t.points[np.searchsorted(t.frames, frame)])
+            for t in tracks
+            if frame in (int(t.keys[0, 0]), int(t.frames[-1]))
+        ]
+        pixels = read(frame) if wanted else None
+        if pixels is None:
+            continue
+        image = _bytes(pixels)
+        for track, (x, y) in wanted:
+            found[track.id, frame] = _picture(
+                cv2.getRectSubPix(image, (pattern, pattern), (float(x), float(y))), ".png"
+            )
+    return found
+
+
+def _bytes(pixels: NDArray[Any]) -> NDArray[np.uint8]:
+    """8 bits, blue first as OpenCV writes it; floating pixels through the curve of sRGB."""
+    image = to_float(pixels)
+    if pixels.dtype.kind == "f":
+        image = np.clip(image, 0.0, 1.0)
+        image = np.where(image <= 0.0031308, 12.92 * image, 1.055 * np.maximum(image, 1e-6) ** (1 / 2.4) - 0.055)
+    image = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[:, :, 2::-1]
+    return np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
+
+
+def _picture(image: NDArray[np.uint8], suffix: str) -> str:
+    _, coded = cv2.imencode(suffix, image)
+    kind = "jpeg" if suffix == ".jpg" else "png"
+    return f"data:image/{kind};base64,{base64.b64encode(coded.tobytes()).decode()}"

@@ -1,0 +1,338 @@
+"""Runs: patterns that are followed from their keys through a plate, all of a frame at once.
+
+A run is one key of one track followed in one direction. Every frame it is foretold (constant motion), fitted against
+its key's template, and judged; what fails is tried again with robust weights, then looked for around the place its
+neighbours foretell. A pattern out of sight is foretold on for some frames and taken back only on a strict likeness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.match.blur import blurred, motion_lines
+from core.match.fit_kernel import FOUND, fit_patterns
+from core.match.template import Templates, cut_templates
+from core.match.track import MODELS, TrackSettings
+
+Image = NDArray[np.float32]
+Reals = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Ranges = Callable[[int, Callable[[int, int], object], int], None]
+COLUMN = {name: k for k, name in enumerate(FOUND)}
+NO_HOLD = np.zeros((0, 0), np.bool_)
+ROBUST_ABOVE = 1.8  # times the variance a run is used to
+LOOSE, STRICT = 6.0, 2.5  # the same, still believed: where it was foretold, and anywhere else
+SURPRISE = 2.0  # pixels off the place foretold
+UNSURE = 1.0  # pixels, standard deviation
+NEIGHBOURS = 5
+PEAKS = 3  # of the correlation that are tried
+NEARER = 0.1  # correlation that the edge of the search is worth less than its middle
+WHITE, CLUMPED = 0.07, 6.0  # lag correlation of good residuals; how much variance of the place more of it adds
+FADE = 0.8  # of the motion from frame to frame while out of sight
+GRAIN = 4
+
+
+class Seen(NamedTuple):
+    """What one frame gave. Rows are runs. covariance and own as in ``Track``."""
+
+    rows: Rows
+    points: Reals
+    covariance: Reals
+    own: Reals
+    score: Reals
+
+
+class Runs:
+    """The state of all runs of one sweep. Arrays have a row for each run."""
+
+    def __init__(self, settings: TrackSettings, channels: int, ranges: Ranges) -> None:
+        self.settings, self.ranges, self.channels = settings, ranges, channels
+        side = 2 * (settings.pattern // 2 + 10) + 1
+        self.templates = Templates(
+            np.zeros((0, side, side, channels), np.float32),
+            np.zeros((0, side, side), np.bool_),
+            np.zeros((0, 2)),
+            np.zeros(0),
+        )
+        self.coefficients = self.templates.coefficients  # blurred like the frame at hand
+        self.warp, self.motion = np.zeros((0, 8)), np.zeros((0, 8))
+        self.light = np.zeros((0, channels, 2))
+        self.shared = np.zeros((0, 3))  # covariance of the template's own place, in its pixels
+        self.key_motion = np.zeros((0, 2))  # template pixels in a frame, at the key
+        self.usual, self.likeness, self.lag = np.zeros(0), np.zeros(0), np.zeros(0)  # of the frames before
+        self.age, self.missed = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self.size, self.stop = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self.alive = np.zeros(0, np.bool_)
+        self._hold = NO_HOLD
+
+    @property
+    def half(self) -> float:
+        return self.settings.pattern / 2.0
+
+    def begin(
+        self,
+        image: Image,
+        points: Reals,
+        stop: Rows,
+        hold: Mask | None = None,
+    ) -> Rows:
+        """Begin runs at `points` (N, 2) of a frame, to be followed to the frames `stop`; returns their rows."""
+        made = cut_templates(image, points, self.settings.pattern, hold)
+        self._hold = NO_HOLD if hold is None else np.ascontiguousarray(hold)
+        first, count = len(self.alive), len(points)
+        rows = np.arange(first, first + count)
+        self.templates = Templates(*(np.concatenate(pair) for pair in zip(self.templates, made, strict=True)))
+        self.coefficients = self.templates.coefficients
+        warp = np.zeros((count, 8))
+        warp[:, :2] = points
+        warp[:, [2, 5]] = 1.0
+        light = np.zeros((count, self.channels, 2))
+        light[:, :, 0] = 1.0
+        size = MODELS["affine" if self.settings.model == "auto" else self.settings.model]
+        fresh: dict[str, NDArray[Any]] = {
+            "warp": warp, "motion": np.zeros((count, 8)), "light": light, "shared": np.zeros((count, 3)),
+            "key_motion": np.zeros((count, 2)), "usual": made.noise, "likeness": np.ones(count),
+            "lag": np.full(count, WHITE),
+            "age": np.zeros(count, np.int64), "missed": np.zeros(count, np.int64),
+            "size": np.full(count, size, np.int64), "stop": stop, "alive": np.ones(count, np.bool_),
+        }  # fmt: skip
+        for name, value in fresh.items():
+            setattr(self, name, np.concatenate((getattr(self, name), value)))
+        warp, light = self.warp.copy(), self.light.copy()
+        found = self._fit(image, rows, warp, light, np.zeros(len(self.alive)))
+        self.shared[rows] = found[rows, :3] * made.noise[:, None]
+        self.alive[rows] = found[rows, COLUMN["pixels"]] > 0
+        return rows
+
+    def step(self, image: Image, hold: Mask | None = None) -> Seen:
+        """Follow every living run into the next frame of the sweep; `hold` (H, W) is True where they must not look."""
+        self._hold = NO_HOLD if hold is None else np.ascontiguousarray(hold)
+        rows = np.flatnonzero(self.alive)
+        told = self._foretell(rows)
+        warp, light = told.copy(), self.light.copy()
+        self._blur(rows, told)
+        fresh = rows[self.age[rows] == 0]
+        self._look(image, fresh, warp)
+        found = self._fit(image, rows, warp, light, np.zeros(len(self.alive)))
+        good = self._judge(rows, found, warp, told)
+        doubt = ~good | (found[rows, COLUMN["variance"]] > ROBUST_ABOVE * self.usual[rows])
+        if doubt.any():
+            sure, doubtful = rows[~doubt], rows[doubt]
+            self._again(image, doubtful, told, told, warp, light, found)
+            lost = ~self._judge(doubtful, found, warp, told)
+            unsure = doubtful[lost | (self.age[doubtful] == 0)]
+            for place in self._places(image, unsure, sure, told, warp):
+                self._again(image, unsure, place, told, warp, light, found)
+            good = self._judge(rows, found, warp, told)
+        self._richer(image, rows[good], warp, light, found)
+        return self._settle(rows, good, told, warp, light, found)
+
+    def miss(self) -> None:
+        """A frame that could not be read: every living run is foretold through it."""
+        rows = np.flatnonzero(self.alive)
+        nothing = np.zeros((len(self.alive), len(FOUND)))
+        self._settle(rows, np.zeros(len(rows), np.bool_), self._foretell(rows), self.warp, self.light, nothing)
+
+    def _foretell(self, rows: Rows) -> Reals:
+        told = self.warp.copy()
+        told[rows, :2] += self.motion[rows, :2]
+        told[rows, 2:6] += 0.5 * self.motion[rows, 2:6]
+        return told
+
+    def _fit(
+        self,
+        image: Image,
+        rows: Rows,
+        warp: Reals,
+        light: Reals,
+        scale: Reals,
+    ) -> Reals:
+        found = np.zeros((len(self.alive), len(FOUND)))
+        rows = np.ascontiguousarray(rows)
+
+        def call(start: int, stop: int) -> None:
+            fit_patterns(
+                image,
+                self._hold,
+                self.coefficients,
+                self.templates.keep,
+                self.templates.centre,
+                warp,
+                light,
+                scale,
+                self.half,
+                self.size,
+                rows,
+                start,
+                stop,
+                found,
+            )
+
+        self.ranges(len(rows), call, GRAIN)
+        return found
+
+    def _judge(
+        self,
+        rows: Rows,
+        found: Reals,
+        warp: Reals,
+        told: Reals,
+    ) -> Mask:
+        """Which of the rows are believed."""
+        f = found[rows]
+        variance, score, usual = f[:, COLUMN["variance"]], f[:, COLUMN["score"]], self.usual[rows]
+        spread = np.sqrt(np.maximum(variance * (f[:, 0] + f[:, 2]), 0.0))
+        area = warp[rows, 2] * warp[rows, 5] - warp[rows, 3] * warp[rows, 4]
+        before = self.warp[rows, 2] * self.warp[rows, 5] - self.warp[rows, 3] * self.warp[rows, 4]
+        ratio = area / np.where(before == 0.0, 1.0, before)
+        off = np.linalg.norm(warp[rows, :2] - told[rows, :2], axis=1)
+        missed = self.missed[rows]
+        fresh = (self.age[rows] == 0) & (missed == 0)
+        calm = (off < SURPRISE) & (missed == 0)
+        like = score > np.where(fresh, 0.8, self.likeness[rows] - 0.1)
+        near = (variance < LOOSE * usual) | (score > self.likeness[rows] - 0.05)
+        anywhere = (variance < np.where(fresh, LOOSE, STRICT) * usual) | (fresh & (score > 0.95))
+        good = (f[:, COLUMN["iterations"]] > 0) & (f[:, COLUMN["step"]] < 0.1) & (f[:, COLUMN["share"]] > 0.4)
+        good &= (score >= self.settings.least_score) & (spread < UNSURE) & (f[:, COLUMN["gain"]] > 0.05)
+        good &= off < 1.5 * self.settings.search + 1.0
+        room = 1.4 * (1.0 + 0.1 * missed)
+        good &= (ratio > 1.0 / room) & (ratio < room)
+        return good & np.where(calm, near, anywhere & like)
+
+    def _again(
+        self, image: Image, rows: Rows, place: Reals, told: Reals, warp: Reals, light: Reals, found: Reals
+    ) -> None:
+        """Fit rows again from `place` (N, 8) with robust weights; keep what is believed and fits better."""
+        tried, lit = place.copy(), self.light.copy()
+        again = self._fit(image, rows, tried, lit, STRICT * self.usual)
+        before = self._judge(rows, found, warp, told)
+        lower = again[rows, COLUMN["variance"]] < found[rows, COLUMN["variance"]]
+        better = rows[self._judge(rows, again, tried, told) & (lower | ~before)]
+        warp[better], light[better], found[better] = tried[better], lit[better], again[better]
+
+    def _places(self, image: Image, rows: Rows, sure: Rows, told: Reals, warp: Reals) -> list[Reals]:
+        """Where else rows may be: the likeliest peaks around the places that what their neighbours did foretells."""
+        start = told.copy()
+        if len(sure):
+            error = warp[sure, :2] - told[sure, :2]
+            for n in rows:
+                distance = np.linalg.norm(told[sure, :2] - told[n, :2], axis=1)
+                start[n, :2] += np.median(error[np.argsort(distance)[:NEIGHBOURS]], axis=0)
+        places = [start]
+        for rank in range(PEAKS):
+            place = start.copy()
+            self._look(image, rows, place, rank)
+            places.append(place)
+        return places
+
+    def _look(self, image: Image, rows: Rows, warp: Reals, rank: int = 0) -> None:
+        """Move warps to the peak number `rank` of the normalised correlation of the warped template nearby."""
+        side, search = self.settings.pattern, self.settings.search
+        middle = side // 2
+        height, width = image.shape[:2]
+        for n in rows:
+            if not (np.abs(warp[n, :2]) < 1e6).all():
+                continue
+            x, y = np.floor(warp[n, :2] + 0.5).astype(int)
+            x0, x1 = max(x - search - middle, 0), min(x + search + middle + 1, width)
+            y0, y1 = max(y - search - middle, 0), min(y + search + middle + 1, height)
+            if x1 - x0 < side or y1 - y0 < side:
+                continue
+            patch = _sample(self.coefficients[n], self.templates.centre[n], warp[n], middle)
+            likeness = cv2.matchTemplate(image[y0:y1, x0:x1], patch, cv2.TM_CCOEFF_NORMED)
+            ys, xs = np.mgrid[0 : likeness.shape[0], 0 : likeness.shape[1]]
+            away = (xs + x0 + middle - warp[n, 0]) ** 2 + (ys + y0 + middle - warp[n, 1]) ** 2
+            likeness = np.nan_to_num(likeness, nan=-1.0) - NEARER * away.astype(np.float32) / search**2
+            peaks = np.flatnonzero(likeness == cv2.dilate(likeness, np.ones((3, 3), np.uint8)))
+            best = peaks[np.argsort(-likeness.ravel()[peaks])[:PEAKS]]
+            py, px = divmod(int(best[min(rank, len(best) - 1)]), likeness.shape[1])
+            warp[n, :2] = px + x0 + middle, py + y0 + middle
+
+    def _richer(
+        self,
+        image: Image,
+        rows: Rows,
+        warp: Reals,
+        light: Reals,
+        found: Reals,
+    ) -> None:
+        """Let a run lean in perspective when the residual pays for two more numbers."""
+        if self.settings.model != "auto":
+            return
+        poor = found[rows, COLUMN["variance"]] > 1.3 * self.templates.noise[rows]
+        due = rows[(self.age[rows] % 10 == 9) & (self.size[rows] == 6) & poor]
+        if not len(due):
+            return
+        tried, lit = warp.copy(), light.copy()
+        self.size[due] = 8
+        again = self._fit(image, due, tried, lit, np.zeros(len(self.alive)))
+        fall = np.log(np.maximum(found[due, 3], 1e-30) / np.maximum(again[due, 3], 1e-30))
+        earned = (again[due, COLUMN["done"]] > 0) & (fall * found[due, COLUMN["pixels"]] * self.channels > 30.0)
+        self.size[due[~earned]] = 6
+
+    def _blur(self, rows: Rows, told: Reals) -> None:
+        if not self.settings.blur:
+            return
+        now = motion_lines(told[rows], self.motion[rows, :2] * self.settings.shutter)
+        young = self.age[rows] == 1
+        self.key_motion[rows[young]] = now[young]
+        self.coefficients = blurred(self.templates, rows, now, self.key_motion[rows])
+
+    def _settle(
+        self,
+        rows: Rows,
+        good: Mask,
+        told: Reals,
+        warp: Reals,
+        light: Reals,
+        found: Reals,
+    ) -> Seen:
+        kept, lost = rows[good], rows[~good]
+        moved = warp[kept] - self.warp[kept]
+        gap = (self.missed[kept] + 1.0)[:, None]
+        self.motion[kept] = moved / gap
+        self.warp[kept], self.light[kept] = warp[kept], light[kept]
+        variance = found[kept, COLUMN["variance"]]
+        young = self.age[kept] < 3
+        share = np.where(young, 0.5, 0.1)
+        self.usual[kept] += share * (np.minimum(variance, 3.0 * self.usual[kept]) - self.usual[kept])
+        score = found[kept, COLUMN["score"]]
+        self.likeness[kept] += np.where(self.age[kept] == 0, 1.0, 0.2) * (score - self.likeness[kept])
+        self.age[kept] += 1
+        self.missed[kept] = 0
+        self.warp[lost, :2] = told[lost, :2]
+        self.motion[lost] *= FADE
+        self.motion[lost, 2:] = 0.0
+        self.missed[lost] += 1
+        self.alive[lost[(self.missed[lost] > self.settings.patience) | (self.age[lost] == 0)]] = False
+        # residuals of a model that does not quite hold are correlated, and say less than their number
+        self.lag[kept] += np.where(young, 0.5, 0.2) * (found[kept, COLUMN["lag"]] - self.lag[kept])
+        own = found[kept, :3] * (variance * (1.0 + CLUMPED * np.maximum(self.lag[kept] - WHITE, 0.0)))[:, None]
+        return Seen(kept, self.warp[kept, :2].copy(), own + carried(self.warp[kept], self.shared[kept]), own, score)
+
+
+def carried(warp: Reals, shared: Reals) -> Reals:
+    """Covariances (N, 3) in template pixels, carried into the frame by the inverse of the warps (N, 8)."""
+    inverse = np.linalg.inv(warp[:, 2:6].reshape(-1, 2, 2))
+    full = shared[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+    return (inverse @ full @ inverse.transpose(0, 2, 1)).reshape(-1, 4)[:, [0, 1, 3]]
+
+
+def _sample(coefficients: Image, centre: Reals, warp: Reals, middle: int) -> Image:
+    """The template as it would lie around a whole pixel of the frame: (2 middle + 1, 2 middle + 1, C)."""
+    steps = np.arange(-middle, middle + 1, dtype=np.float64)
+    x, y = np.meshgrid(steps, steps)
+    u = (warp[2] * x + warp[3] * y + centre[0]).astype(np.float32)
+    v = (warp[4] * x + warp[5] * y + centre[1]).astype(np.float32)
+    pixels = cv2.sepFilter2D(coefficients, -1, THIRD, THIRD)  # splines at whole numbers
+    out = cv2.remap(pixels, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(out, np.float32).reshape(*out.shape[:2], -1)
+
+
+THIRD = np.array([1.0, 4.0, 1.0]) / 6.0

@@ -1,0 +1,157 @@
+"""Records of 2D tracks: one point of the scene, seen in a plate frame by frame."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.field import field
+from core.record import Record, column, number, text
+
+MODELS = {"translation": 2, "similarity": 4, "affine": 6, "homography": 8}
+
+
+class TrackSettings(Record):
+    """How patterns are followed."""
+
+    pattern: Annotated[
+        int,
+        field(
+            "Pattern",
+            "Side of the square that is followed; larger is steadier, smaller bends less with the surface.",
+            "pixels",
+            soft=(9, 61),
+            hard=(7, 201),
+            step=2,
+        ),
+    ] = 21
+    search: Annotated[
+        int,
+        field(
+            "Search",
+            "How far from the place foretold the pattern is looked for when it is not found at once.",
+            "pixels",
+            soft=(5, 100),
+            hard=(2, 500),
+            step=1,
+        ),
+    ] = 30
+    model: Annotated[
+        str,
+        field(
+            "Model",
+            "How the pattern may change: move; turn and grow; shear; lean in perspective. Auto takes what pays.",
+            choices=("auto", *MODELS),
+        ),
+    ] = "auto"
+    blur: Annotated[
+        bool,
+        field(
+            "Motion blur",
+            "Blurs the pattern like the frame it is compared with, from the motion and the shutter.",
+        ),
+    ] = False
+    shutter: Annotated[
+        float,
+        field(
+            "Shutter",
+            "Part of a frame's time the shutter is open; 0.5 is the 180 degrees of film.",
+            "frames",
+            soft=(0.0, 1.0),
+            hard=(0.0, 2.0),
+            step=0.05,
+        ),
+    ] = 0.5
+    least_score: Annotated[
+        float,
+        field(
+            "Least score",
+            "A frame whose likeness to the key falls under this is not kept.",
+            soft=(0.3, 0.95),
+            hard=(0.0, 1.0),
+            step=0.05,
+        ),
+    ] = 0.5
+    patience: Annotated[
+        int,
+        field(
+            "Patience",
+            "How many frames a pattern may be out of sight before its track ends.",
+            "frames",
+            soft=(0, 48),
+            hard=(0, 1000),
+            step=1,
+        ),
+    ] = 16
+
+    def __post_init__(self) -> None:
+        number(self, "pattern", least=7, most=201)
+        number(self, "search", least=2, most=500)
+        number(self, "shutter", least=0.0, most=2.0)
+        number(self, "least_score", least=0.0, most=1.0)
+        number(self, "patience", least=0, most=1000)
+        if self.model != "auto" and self.model not in MODELS:
+            raise ValueError(f"TrackSettings.model must be auto or one of {', '.join(MODELS)}, not {self.model!r}")
+
+
+class Track(Record):
+    """One point through a plate. Pixels, centres at whole numbers, origin top left, y down; frames as files count them.
+
+    id : stable, unique among the tracks of a document.
+    keys : (K, 3) float64 frame, x, y set by a hand or by the finder of features, frames rising.
+    frames : (F,) int32 rising; the frames where the point was seen, keys among them.
+    points : (F, 2) float64.
+    covariance : (F, 3) float64 xx, xy, yy of the whole error against the keys, px^2.
+    own : (F, 3) float64, of the frame's own error: independent from frame to frame. What all frames share, the noise
+        in the template, stands on the frame of the key instead, so a solver takes these as they are.
+    score : (F,) float64, 0 to 1, likeness to the template.
+    """
+
+    id: int
+    name: str
+    keys: NDArray[np.float64]
+    frames: NDArray[np.int32]
+    points: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    own: NDArray[np.float64]
+    score: NDArray[np.float64]
+    plate_id: int = 0
+    hidden: bool = False
+    locked: bool = False
+
+    def __post_init__(self) -> None:
+        text(self, "name")
+        number(self, "id", "plate_id", least=0, most=2**31 - 1)
+        column(self, "keys", np.float64, (None, 3))
+        column(self, "frames", np.int32, (None,))
+        count = len(self.frames)
+        column(self, "points", np.float64, (count, 2))
+        column(self, "covariance", np.float64, (count, 3))
+        column(self, "own", np.float64, (count, 3))
+        column(self, "score", np.float64, (count,))
+        for name, frames in (("keys", self.keys[:, 0]), ("frames", self.frames)):
+            if (np.diff(frames) <= 0).any():
+                raise ValueError(f"Track.{name} must rise from frame to frame")
+
+
+HAND = 1e-6  # px^2: the variance of a key against itself
+
+
+def keyed_track(track_id: int, name: str, keys: NDArray[np.float64], plate_id: int = 0) -> Track:
+    """A track that has only its keys (K, 3) frame, x, y; of two keys on one frame the later one counts."""
+    _, last = np.unique(keys[::-1, 0], return_index=True)
+    keys = np.ascontiguousarray(keys[len(keys) - 1 - last], np.float64)
+    sure = np.tile([HAND, 0.0, HAND], (len(keys), 1))
+    return Track(
+        id=track_id,
+        name=name,
+        keys=keys,
+        frames=keys[:, 0].astype(np.int32),
+        points=np.ascontiguousarray(keys[:, 1:]),
+        covariance=sure,
+        own=sure,
+        score=np.ones(len(keys)),
+        plate_id=plate_id,
+    )
