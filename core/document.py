@@ -10,9 +10,10 @@ from core.errors import UserError
 from core.field import field
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
+from core.pose.pose import Pose
 from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
-from core.record import Record, number, text
+from core.record import Record, column, number, text
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 RATES = (0.001, 100_000.0)  # frames per second
@@ -25,6 +26,11 @@ class MeshObject(Record):
     id : stable, unique in the document.
     rig : what moves it, or None for a mesh at rest.
     correctives : what was sculpted at poses of the rig, or None.
+    pose : the pose held in the view, None for the clip at the frame. library : poses kept for later, by name.
+    joint_selection : names of the joints that are selected, the active one last.
+    locked_joints : names of joints whose skin weights no brush changes.
+    mask : (V,) float32, how much sculpting spares each vertex, 0 free .. 1 protected; None for nothing.
+    surface : (V, 3) float32, what is shown while a stroke shapes the held pose; None otherwise, in files always.
     """
 
     id: int
@@ -32,6 +38,12 @@ class MeshObject(Record):
     mesh: Mesh
     rig: Rig | None = None
     correctives: Correctives | None = None
+    pose: Pose | None = None
+    library: tuple[Pose, ...] = ()
+    joint_selection: tuple[str, ...] = ()
+    locked_joints: tuple[str, ...] = ()
+    mask: np.ndarray | None = None
+    surface: np.ndarray | None = None
     hidden: Annotated[bool, field(
         "Hidden", "Leaves the mesh and its hair out of the view; they stay in the document and its files.",
     )] = False
@@ -46,6 +58,13 @@ class MeshObject(Record):
             raise ValueError(f"MeshObject.rig moves {len(self.rig.skin.joints)} vertices of {len(self.mesh.points)}")
         if self.correctives is not None and self.correctives.vertex_count > len(self.mesh.points):
             raise ValueError("MeshObject.correctives correct a vertex that the mesh does not have")
+        vertices = len(self.mesh.points)
+        if self.mask is not None:
+            column(self, "mask", np.float32, (vertices,))
+        if self.surface is not None:
+            column(self, "surface", np.float32, (vertices, 3))
+        if len({pose.name for pose in self.library}) != len(self.library):
+            raise ValueError("MeshObject.library holds two poses of the same name")
 
 
 class Document(Record):

@@ -74,7 +74,9 @@ class Workspace(Record):
     frame : the current frame.
     cameras : the cameras of the views, first the one last used. bookmarks : cameras by name.
     panels : names of the visible panels.
+    craft : name of the active craft.
     groom : id of the groom that tools edit; None for the first of the document.
+    mesh : id of the mesh that is posed and sculpted; None for the first with a rig.
     tool : name of the active tool; params : parameters of the tools by name as plain JSON values, never changed in
         place.
     """
@@ -83,7 +85,9 @@ class Workspace(Record):
     cameras: tuple[Camera, ...] = ()
     bookmarks: dict[str, Camera] = {}  # noqa: RUF012 (msgspec makes a new one each time)
     panels: tuple[str, ...] = ()
+    craft: str = "groom"
     groom: int | None = None
+    mesh: int | None = None
     tool: str = ""
     params: dict[str, Any] = {}  # noqa: RUF012 (msgspec makes a new one each time)
     respect: Respect = Respect()

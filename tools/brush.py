@@ -14,46 +14,45 @@ from core.groom.region import editable
 from core.groom.rows import take_rows
 from core.overlay import Overlays
 from core.record import freeze
-from tools.ring import BrushParams, ReachParams, ring_radius, ring_strength
+from tools.groom.craft import GroomGround
+from tools.ring import BrushParams, ReachParams, RingParams, ring_radius, ring_strength
 from tools.screen import Screen
 from tools.tool import Ground, Pointer
 
-R = TypeVar("R", bound=ReachParams)
+R = TypeVar("R", bound=RingParams)
+A = TypeVar("A", bound=ReachParams)
+G = TypeVar("G", bound=Ground)
+V = TypeVar("V")
 DAB = 0.25  # what a press alone does, as much as this way in radii
 
 
-class BrushStroke(Generic[R]):
-    """A stroke with a ring. A subclass says in :meth:`brush` what one piece of the way does.
+class RingStroke(Generic[R, G, V]):
+    """A stroke with a ring, of any craft. A subclass says in :meth:`brush` what one piece of the way does.
 
     way : (K, 2) pixels since the last samples, one point at press. radius : pixels there. last : the newest sample.
     """
 
-    def __init__(self, params: R, ground: Ground) -> None:
+    def __init__(self, params: R, ground: G) -> None:
         self.params, self.ground = params, ground
         self.way: NDArray[np.float64] = np.empty((0, 2))
         self.radius = 0.0
         self.last: Pointer | None = None
 
-    @cached_property
-    def screen(self) -> Screen:
-        """Where the guides are on the screen."""
-        return Screen(self.ground.view, self.ground.guides)
-
-    def brush(self, guides: Guides) -> Guides:
-        """Guides after the piece `way` of the stroke."""
+    def brush(self, matter: V, /) -> V:
+        """The matter after the piece `way` of the stroke."""
         raise NotImplementedError
 
-    def extend(self, guides: Guides, pointers: tuple[Pointer, ...]) -> Guides:
-        """Guides after these samples."""
+    def extend(self, matter: V, pointers: tuple[Pointer, ...]) -> V:
+        """The matter after these samples."""
         samples = pointers if self.last is None else (self.last, *pointers)
         self.way = np.array([(p.x, p.y) for p in samples], np.float64)
         self.last = pointers[-1]
         self.radius = ring_radius(self.params, self.ground, self.last)
-        return self.brush(guides)
+        return self.brush(matter)
 
-    def finish(self, guides: Guides) -> Guides:
+    def finish(self, matter: V) -> V:
         """Nothing more is done at release."""
-        return guides
+        return matter
 
     def overlays(self) -> Overlays:
         """Nothing but the ring."""
@@ -72,6 +71,15 @@ class BrushStroke(Generic[R]):
         assert isinstance(self.params, BrushParams)
         assert self.last is not None
         return ring_strength(self.params, self.last) * self.travel
+
+
+class BrushStroke(RingStroke[A, GroomGround, Guides]):
+    """A stroke with a ring that reaches guides."""
+
+    @cached_property
+    def screen(self) -> Screen:
+        """Where the guides are on the screen."""
+        return Screen(self.ground.view, self.ground.guides)
 
     def under(
         self, guides: Guides, only_editable: bool = True, roots_only: bool = False

@@ -136,7 +136,8 @@ def replaced_mesh(document: Document, mesh_id: int, mesh: Mesh) -> Replaced:
         doubtful[groom.id] = groom.guides.ids[method == RebindMethod.CLOSEST_ANY]
         maps = tuple(_carried(one, old, mesh) for one in groom.maps)
         grooms.append(groom.replace(guides=guides, maps=maps))
-    meshes = tuple(item.replace(mesh=mesh, rig=rig) if m is item else m for m in document.meshes)
+    mask = item.mask if len(mesh.points) == len(old.points) else None
+    meshes = tuple(item.replace(mesh=mesh, rig=rig, mask=mask) if m is item else m for m in document.meshes)
     return Replaced(document.replace(meshes=meshes, grooms=tuple(grooms)), doubtful)
 
 

@@ -1,8 +1,8 @@
 """The hand: one stroke at a time, from pointers to a named step.
 
-A press makes a stroke of the active tool (and its mirror image with symmetry), every batch of samples makes new guides
-that are shown as a preview, and the release is one step of history. Esc, an error or another tool puts the old value
-back. Pose, symmetry and what is respected are dealt with here, so that tools are only about hair.
+A press makes a stroke of the active tool (and its mirror image with symmetry), every batch of samples makes new matter
+that is shown as a preview, and the release is one step of history. Esc, an error or another tool puts the old value
+back. What the matter is, and what becomes of it, the craft of the tool knows (:mod:`tools.craft`).
 """
 
 from __future__ import annotations
@@ -12,37 +12,28 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
-import numpy as np
 
-from core.camera import clip_from_world
-from core.document import Document, mesh_to_edit, with_groom
+from core.document import Document
 from core.errors import UserError
-from core.groom.groom import Groom
-from core.groom.guides import Guides
-from core.groom.region import View
 from core.overlay import Circle, Overlays
-from core.posed import field_at, field_known, skin_at
-from core.workspace import Respect
+from tools.craft import Craft
 from tools.pen import Pen, PenSettings
-from tools.pose import BackToRest, in_pose
-from tools.respect import respected, restored
 from tools.ring import RingParams, ring_radius
 from tools.tool import Ground, Picks, Pointer, Sight, Stroke, Tool
 
 if TYPE_CHECKING:
     from tools.session import Session
 
-MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])  # across the object's own X = 0 plane
-
 
 class StrokeRecord(NamedTuple):
-    """Everything a stroke was made of: replayed, it gives the same bits."""
+    """Everything a stroke was made of: replayed, it gives the same bits.
+
+    place : fields of the workspace it was made in, as its craft named them.
+    """
 
     tool: str
     params: dict[str, Any]
-    groom: int
-    frame: float
-    respect: Respect
+    place: dict[str, Any]
     sight: Sight
     batches: tuple[tuple[Pointer, ...], ...]
 
@@ -61,21 +52,25 @@ class Hand:
         self.waits = True
         self.pen = PenSettings()
         self.recorded: Callable[[StrokeRecord], None] | None = None
+        self._crafts: dict[str, Craft[Any, Any]] = {}
         self._pen = Pen(self.pen)
         self._tool: Tool[Any] | None = None
-        self._strokes: list[tuple[Stroke, Ground]] = []
-        self._guides: Guides | None = None
+        self._strokes: list[tuple[Stroke[Any], Ground]] = []
+        self._matter: Any = None
         self._batches: list[tuple[Pointer, ...]] = []
         self._record: StrokeRecord | None = None
-        self._back: BackToRest | None = None
-        self._ground: tuple[tuple[Any, ...], tuple[Ground, ...]] | None = None
-        self._bare = False  # the stroke does not collide yet
-        self._prepared: tuple[Any, ...] | None = None  # what was last handed out to be prepared
+        self._bare = False  # the stroke goes without something slow that is not there yet
 
     @property
     def stroking(self) -> bool:
         """True between press and release."""
         return self._tool is not None
+
+    def craft(self, name: str) -> Craft[Any, Any]:
+        """This hand's craft of that name."""
+        if name not in self._crafts:
+            self._crafts[name] = self.session.tools.crafts[name]()
+        return self._crafts[name]
 
     def press(self, sight: Sight, pointer: Pointer, tool: Tool[Any] | None = None) -> None:
         """Begin a stroke of `tool`, by default the active one or what held keys turn it into.
@@ -87,21 +82,18 @@ class Hand:
         """
         self.cancel()
         tool = self.tool_for(pointer) if tool is None else tool
-        grounds = self._grounds(sight, tool)
+        craft, grounds = self.craft(tool.craft), self._grounds(sight, tool)
         self._pen = Pen(self.pen)
         (first,) = self._pen.filtered((pointer,))
         self._strokes = [(tool.begin(ground, first), ground) for ground in grounds]
-        self._tool, self._guides = tool, grounds[0].guides
+        self._tool, self._matter = tool, craft.matter(tool, grounds[0])
         self._batches = []
-        self._bare = tool.edits == "shape" and grounds[0].field is None
+        self._bare = not craft.ready(tool, grounds[0])
         work = self.preparation() if self._bare else None
         if work is not None:
             Thread(target=work, name="skin for the hand", daemon=True).start()
-        workspace = self.session.workspace
-        self._record = StrokeRecord(
-            tool.name, msgspec.to_builtins(tool.params), grounds[0].groom.id, workspace.frame, workspace.respect,
-            sight, (),
-        )
+        place = craft.place(self.session, grounds[0])
+        self._record = StrokeRecord(tool.name, msgspec.to_builtins(tool.params), place, sight, ())
         self._extend((first,))
 
     def move(self, pointers: tuple[Pointer, ...]) -> None:
@@ -121,14 +113,11 @@ class Hand:
         tool = self._tool
         try:
             if self._bare:
-                field_at(self._strokes[0][1].item, self._strokes[0][1].frame, self.session.evaluator)
+                self.craft(tool.craft).wait(self._strokes[0][1])
                 self._make_again()
-            guides = self._guides
             for stroke, _ in self._strokes:
-                assert guides is not None
-                guides = stroke.finish(guides)
-            assert guides is not None
-            document = self._document(guides)
+                self._matter = stroke.finish(self._matter)
+            document = self._document(self.craft(tool.craft).document)
         except BaseException:
             self.cancel()
             raise
@@ -161,7 +150,7 @@ class Hand:
     def replay(self, record: StrokeRecord) -> None:
         """Make a recorded stroke again: the same bits on the same document."""
         session = self.session
-        session.set_workspace(groom=record.groom, frame=record.frame, respect=record.respect)
+        session.set_workspace(**record.place)
         tool = session.tools.make(record.tool, record.params)
         settings, self.pen = self.pen, PenSettings(spikes=False, smoothing=0.0)  # they are filtered already
         try:
@@ -208,109 +197,56 @@ class Hand:
 
         The same is handed out once.
         """
-        session, frame, evaluator = self.session, self.session.workspace.frame, self.session.evaluator
-        try:
-            item = mesh_to_edit(session.history.current, session.groom)
-        except UserError:
-            return None
-        frames = [at for at in (frame, None) if not field_known(item, at, evaluator)]
-        key = item.mesh, item.rig, item.correctives, frame
-        same = self._prepared is not None and all(a is b or a == b for a, b in zip(self._prepared, key, strict=True))
-        if not frames or same:
-            return None
-        self._prepared = key
-        return lambda: [field_at(item, at, evaluator) for at in frames]
+        return self.craft(self.session.tool.craft).preparation(self.session)
+
+    def _grounds(self, sight: Sight, tool: Tool[Any]) -> tuple[Any, ...]:
+        return self.craft(tool.craft).grounds(self.session, sight, tool)
 
     def _extend(self, pointers: tuple[Pointer, ...]) -> None:
+        assert self._tool is not None
+        craft = self.craft(self._tool.craft)
         try:
-            before = self._guides
-            if self._bare and self._strokes[0][1].field is not None:
+            before = self._matter
+            if self._bare and craft.ready(self._tool, self._strokes[0][1]):
                 self._make_again()
             self._apply(pointers)
-            if self._guides is not before:
-                assert self._guides is not None
-                self.session.preview(self._document(self._guides))
+            if self._matter is not before:
+                self.session.preview(self._document(craft.shown))
         except BaseException:
             self.cancel()
             raise
 
     def _apply(self, pointers: tuple[Pointer, ...]) -> None:
-        guides = self._guides
         for stroke, _ in self._strokes:
-            assert guides is not None
-            guides = stroke.extend(guides, pointers)
+            self._matter = stroke.extend(self._matter, pointers)
         self._batches.append(pointers)
-        self._guides = guides
 
     def _make_again(self) -> None:
-        """The stroke from its beginning, now that there is something to collide with."""
+        """The stroke from its beginning, now that what it went without is there."""
         assert self._tool is not None
         self._bare = False
         grounds, batches = [ground for _, ground in self._strokes], self._batches
         self._strokes = [(self._tool.begin(ground, batches[0][0]), ground) for ground in grounds]
-        self._guides, self._batches = grounds[0].guides, []
+        self._matter, self._batches = self.craft(self._tool.craft).matter(self._tool, grounds[0]), []
         for batch in batches:
             self._apply(batch)
 
-    def _grounds(self, sight: Sight, tool: Tool[Any]) -> tuple[Ground, ...]:
-        """What strokes would work on, one for each side of symmetry; the same objects while nothing changed."""
-        session, workspace = self.session, self.session.workspace
-        document = session.history.current
-        groom = session.groom
-        item = mesh_to_edit(document, groom)
-        key = (
-            groom, item, workspace.frame, workspace.respect, sight.camera, sight.width, sight.height, document.unit,
-            tool.at_rest, tool.edits, self.waits,
-        )
-        if self._ground is not None and all(a is b or a == b for a, b in zip(self._ground[0], key, strict=True)):
-            return self._ground[1]
-        frame, evaluator = workspace.frame, session.evaluator
-        skin, rest = skin_at(item, frame, evaluator), skin_at(item, None, evaluator)
-        guides = respected(groom.guides, workspace.respect, tool.edits)
-        if not tool.at_rest and skin is not rest:
-            guides = in_pose(guides, skin)
-        matrix = clip_from_world(sight.camera, sight.width, sight.height)
-        sides = (matrix, matrix @ MIRROR) if workspace.respect.symmetry else (matrix,)
-        grounds = tuple(
-            Ground(
-                sight, View(side, sight.width, sight.height), item, frame, skin, rest, groom, guides, evaluator,
-                document.unit, tool.at_rest, side is not matrix, self.waits,
-            )
-            for side in sides
-        )
-        self._ground = (key, grounds)
-        return grounds
-
-    def _document(self, guides: Guides) -> Document:
-        """The document with these guides in place of those at press."""
-        assert self._tool is not None
-        ground = self._strokes[0][1]
-        document = self.session.history.current
-        if guides is ground.guides:
-            return document
-        before = ground.groom.guides
-        if not self._tool.at_rest and ground.skin is not ground.rest:
-            if self._back is None:
-                self._back = BackToRest(ground.guides, before, ground.skin)
-            guides = self._back(guides)
-        guides = restored(before, guides, self.session.workspace.respect, self._tool.edits)
-        groom: Groom = ground.groom.replace(guides=guides)
-        return with_groom(document, groom)
+    def _document(self, made: Callable[..., Document]) -> Document:
+        """The document with the matter of now in place of that at press."""
+        return made(self.session.history.current, self._tool, self._strokes[0][1], self._matter)
 
     def _drop(self) -> None:
-        self._tool, self._guides, self._record, self._back = None, None, None, None
+        self._tool, self._matter, self._record = None, None, None
         self._strokes, self._batches, self._bare = [], [], False
 
 
 def _ghost(tool: Tool[Any], ground: Ground, pointer: Pointer) -> Overlays:
     """A fainter ring where the stroke works on the other side."""
-    if not isinstance(tool.params, RingParams):
-        return ()
-    hit = ground.hit(pointer)
+    hit = ground.hit(pointer) if isinstance(tool.params, RingParams) else None
     if hit is None:
         return ()
     _, near = ground.view.pixels(hit.point)
-    place, far = ground.view.pixels(hit.point * [-1.0, 1.0, 1.0])
+    place, far = ground.view.pixels(ground.opposite(hit))
     if far <= 0.0:
         return ()
     radius = ring_radius(tool.params, ground, pointer) * float(near / far)

@@ -173,8 +173,7 @@ class _Writer:
         if isinstance(step, StrokeRecord):
             sight = self.value(step.sight)
             name = self._sights.setdefault(sight, f"SIGHT_{len(self._sights) + 1}")
-            rest = [f"{field}={self.value(getattr(step, field))}" for field in ("tool", "params", "groom", "frame",
-                                                                               "respect")]
+            rest = [f"{field}={self.value(getattr(step, field))}" for field in ("tool", "params", "place")]
             batches = [f"    ({self._items(batch)})," for batch in step.batches]
             return [
                 f"session.hand.replay({self._named(StrokeRecord)}({', '.join(rest)}, sight={name}, batches=(", *batches,

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from core.document import Document, MeshObject, find_mesh, with_mesh
@@ -19,8 +20,8 @@ from core.pose import edit_layers
 from core.pose.controls import rotation_dof
 from core.pose.corrective import as_kind
 from core.pose.layers import space_dofs
-from core.pose.pose import Pose
-from core.pose.pose_space import Correctives, Dof, Falloff, PoseLayer, Way
+from core.pose.pose import SAME, Pose
+from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, Way
 from core.pose.rig import Rig
 from core.pose.synthesis import evaluate
 
@@ -195,3 +196,26 @@ def _changed(document: Document, mesh_id: int, correctives: Correctives, first: 
     made = edit_layers.refresh(item.mesh.points, rig, correctives, first, item.correctives)
     return with_mesh(document, item.replace(correctives=made.correctives))
 
+
+
+def sculpt_name(correctives: Correctives | None, pose: Pose) -> str:
+    """The name under which a sculpt at a pose is kept: that of the pose sculpted there, else a free one."""
+    samples = [] if correctives is None else [s.pose for layer in correctives.layers for s in layer.space.samples]
+    for known in samples:
+        if same_pose(known, pose):
+            return known.name
+    taken = {known.name for known in samples} | {REST_NAME}
+    base = pose.name[:200]
+    return next(n for n in (base, *(f"{base} {i}" for i in range(2, len(taken) + 3))) if n not in taken)
+
+
+def same_pose(one: Pose, other: Pose) -> bool:
+    """True when two poses put every control in the same place, whatever their names are."""
+    def differs(a: Mapping[str, Any], b: Mapping[str, Any], rest: Any) -> bool:
+        both = a.keys() | b.keys()
+        return any(np.abs(np.subtract(a.get(c, rest), b.get(c, rest))).max() > SAME for c in both)
+
+    turned = (0.0, 0.0, 0.0, 1.0)
+    return not (
+        differs(one.rotations, other.rotations, turned) or differs(one.numbers, other.numbers, 0.0)
+        or differs(one.translations, other.translations, (0.0, 0.0, 0.0)))

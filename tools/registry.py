@@ -14,11 +14,13 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-import tools.groom
 from core.errors import UserError
 from core.field import fields_of
+from tools.groom.craft import GroomCraft
+from tools.pose.craft import PoseCraft
 from tools.tool import Tool
 
+CRAFTS = (GroomCraft, PoseCraft)  # their tools are in the folders of their names
 PLUGINS = "FILOPLUME_PLUGINS"  # folders of a studio's own tools, separated as in PATH
 
 
@@ -30,7 +32,7 @@ class Trouble(NamedTuple):
 
 
 class Registry:
-    """Tools by name, in the order of the shelf.
+    """Tools by name, in the order of the shelf, and the crafts they belong to.
 
     Parameters
     ----------
@@ -41,8 +43,11 @@ class Registry:
     def __init__(self, folders: tuple[Path, ...] | None = None) -> None:
         self.tools: dict[str, type[Tool[Any]]] = {}
         self.troubles: list[Trouble] = []
-        for found in pkgutil.iter_modules(tools.groom.__path__):
-            self._add(f"{found.name}.py", lambda name=found.name: importlib.import_module(f"tools.groom.{name}"))
+        self.crafts: dict[str, type[Any]] = {kind.name: kind for kind in CRAFTS}
+        for craft in CRAFTS:
+            package = importlib.import_module(f"tools.{craft.name}")
+            for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+                self._add(f"{found.name}.py", lambda name=found.name: importlib.import_module(name))
         for folder in _plugin_folders() if folders is None else folders:
             if not folder.is_dir():
                 self.troubles.append(Trouble(str(folder), "there is no such folder"))
@@ -55,6 +60,10 @@ class Registry:
 
     def __contains__(self, name: str) -> bool:
         return name in self.tools
+
+    def of(self, craft: str) -> tuple[type[Tool[Any]], ...]:
+        """The tools of a craft, in the order of its shelf."""
+        return tuple(kind for kind in self if kind.craft == craft)
 
     def make(self, name: str, params: dict[str, Any] | None = None) -> Tool[Any]:
         """The tool of that name with parameters from plain JSON values (a preset, a workspace).
@@ -95,6 +104,9 @@ def _check(kind: type[Tool[Any]]) -> None:
             raise ValueError(f"the tool {kind.__name__} needs a {word}")
     if not isinstance(getattr(kind, "order", None), int):
         raise ValueError(f"the tool {kind.__name__} needs an order, a whole number that places it on the shelf")
+    edits = {craft.name: craft.edits for craft in CRAFTS}
+    if kind.edits not in edits.get(kind.craft, ()):
+        raise ValueError(f"the tool {kind.__name__} edits {kind.edits!r}, which the craft {kind.craft!r} does not know")
     if len(kind.tooltip.split()) < 8:
         raise ValueError(f"the tooltip of {kind.name} says too little")
     fields_of(kind.Params)

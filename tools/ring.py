@@ -51,7 +51,7 @@ def ring_radius(params: RingParams, ground: Ground, pointer: Pointer) -> float:
     radius = params.size
     if params.world:
         hit = ground.hit(pointer)
-        metres = params.size / WORLD_PIXELS * ground.rest.diagonal
+        metres = params.size / WORLD_PIXELS * ground.size
         radius = metres * ground.pixels_per_metre(None if hit is None else hit.point)
     return radius * (max(pointer.pressure, LIGHTEST) if params.pressure_size else 1.0)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from core.document import Document, find_groom
+from core.document import Document, MeshObject, find_groom, find_mesh
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats.arrays import ArrayHashes
@@ -24,7 +24,6 @@ from tools.registry import Registry
 from tools.tool import Tool
 
 Listener = Callable[[Document, Document], None]
-FIRST_TOOL = "comb"
 
 
 class Session:
@@ -125,9 +124,22 @@ class Session:
 
     @property
     def tool(self) -> Tool[Any]:
-        """The active tool with the parameters of the workspace; the comb when that names none."""
-        name = next(name for name in (self.workspace.tool, FIRST_TOOL, *self.tools.tools) if name in self.tools)
-        return self.tool_named(name)
+        """The active tool of the active craft, with the parameters of the workspace."""
+        craft = self.workspace.craft if self.workspace.craft in self.tools.crafts else "groom"  # of a file to come
+        names = [kind.name for kind in self.tools.of(craft)]
+        wanted = self.workspace.tool, self.tools.crafts[craft].first
+        return self.tool_named(next(name for name in (*wanted, *names) if name in names))
+
+    @property
+    def mesh(self) -> MeshObject:
+        """The mesh that the pose craft works on; UserError when there is none with a rig."""
+        document, wanted = self.history.current, self.workspace.mesh
+        if wanted is not None:
+            return find_mesh(document, wanted)
+        found = next((item for item in document.meshes if item.rig is not None), None)
+        if found is None:
+            raise UserError("There is no mesh with a rig to pose; import one with a skeleton or blend shapes first.")
+        return found
 
     @property
     def groom(self) -> Groom:
@@ -147,13 +159,13 @@ class Session:
         return self._tool[2]
 
     def set_workspace(self, **changes: Any) -> None:
-        """Replace fields of the workspace. Another tool, groom or frame gives up the stroke that goes on."""
-        if self.stroking and changes.keys() & {"tool", "groom", "frame", "respect"}:
+        """Replace fields of the workspace. Another tool, groom, mesh or frame gives up the stroke that goes on."""
+        if self.stroking and changes.keys() & {"craft", "tool", "groom", "mesh", "frame", "respect"}:
             self.hand.cancel()
         self.workspace = self.workspace.replace(**changes)
 
     def choose(self, name: str, **params: Any) -> None:
-        """Make a tool the active one, with some of its parameters changed.
+        """Make a tool (and its craft) the active one, with some of its parameters changed.
 
         Raises
         ------
@@ -161,7 +173,14 @@ class Session:
             There is no such tool, or a parameter is not as it should be.
         """
         self.remember(name, params)
-        self.set_workspace(tool=name)
+        self.set_workspace(tool=name, craft=self.tools.tools[name].craft)
+
+    def set_craft(self, name: str) -> None:
+        """Make a craft the active one, with the first of its tools; UserError when there is no such craft."""
+        if name not in self.tools.crafts:
+            raise UserError(f"There is no craft named {name!r}; choose one of {', '.join(self.tools.crafts)}.")
+        if name != self.workspace.craft:
+            self.set_workspace(craft=name, tool=self.tools.crafts[name].first)
 
     def remember(self, name: str, params: Mapping[str, Any]) -> None:
         """Change some parameters of a tool without taking it into the hand (errors as of :meth:`choose`)."""

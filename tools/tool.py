@@ -1,39 +1,26 @@
 """The whole vocabulary of tools: what a hand sends, what a tool sees, and what a tool is.
 
 A tool is a class in a file of its own. It turns pixels into the arguments of kernels in core, which do the work:
-``begin`` makes a throw-away stroke at press, whose ``extend`` returns new guides for every batch of pointers. A tool
-never draws: it returns :mod:`core.overlay` values. It never sees the document, undo, symmetry, the pose or what is
-respected: those belong to :class:`tools.hand.Hand`.
+``begin`` makes a throw-away stroke at press, whose ``extend`` returns new matter (guides, vertices, weights, a pose)
+for every batch of pointers. A tool never draws: it returns :mod:`core.overlay` values. It never sees the document,
+undo, symmetry or what is respected: those belong to :class:`tools.hand.Hand` and the tool's :class:`tools.craft.Craft`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.camera import Camera, pixel_scale
-from core.document import MeshObject
-from core.errors import UserError
-from core.evaluator import Evaluator
-from core.groom.groom import Groom
-from core.groom.guides import Guides
+from core.camera import Camera
 from core.groom.region import View
-from core.mesh.bvh import cast_rays
-from core.mesh.distance_field import DistanceField
-from core.mesh.skin import Skin
 from core.overlay import Overlays
-from core.posed import field_at, field_known
 from core.record import Record
-from tools.pose import in_pose
-from tools.respect import Edits
 from tools.ring import RingParams, ring_overlays
-from tools.screen import Screen
 
 
 class Pointer(NamedTuple):
@@ -73,73 +60,34 @@ class Hit(NamedTuple):
 
 @dataclass(frozen=True)
 class Ground:
-    """What a stroke works on. On the mirrored side of symmetry `view` is reflected, so that tools need not know.
+    """What a stroke works on, as every craft knows it: how the artist looks, and at which side of symmetry.
 
-    skin : in the pose shown at `frame`. rest : at rest, where roots are planted.
-    guides : at press, in the pose shown (at rest for tools with ``at_rest``), with what is not respected taken off.
+    view : on the mirrored side of symmetry it may be reflected, so that tools need not know.
     unit : of length, what numbers are shown in (core.document.METRES_PER_UNIT).
-    at_rest : the tool works at rest, whatever pose is shown.
     mirrored : the other side of symmetry, for the few things a stroke does only once.
-    waits : see :attr:`field`.
     """
 
     sight: Sight
     view: View
-    item: MeshObject
-    frame: float
-    skin: Skin
-    rest: Skin
-    groom: Groom
-    guides: Guides
-    evaluator: Evaluator
     unit: str = "m"
-    at_rest: bool = False
     mirrored: bool = False
-    waits: bool = True
 
     @property
-    def seed(self) -> int:
-        """Of this stroke, for everything random in it."""
-        return self.groom.guides.next_id
-
-    @cached_property
-    def shown(self) -> Guides:
-        """The guides at press in the pose shown, for tools that work at rest too."""
-        return in_pose(self.guides, self.skin) if self.at_rest and self.skin is not self.rest else self.guides
-
-    @cached_property
-    def screen(self) -> Screen:
-        """Where the guides at press are on the screen (made at the first asking)."""
-        return Screen(self.view, self.shown)
-
-    @property
-    def field(self) -> DistanceField | None:
-        """What to collide with in the pose shown, made at the first asking.
-
-        None while it is made elsewhere and nobody waits for it: the hand makes the stroke again when it is there.
-        """
-        if not self.waits and not field_known(self.item, self.frame, self.evaluator):
-            return None
-        return field_at(self.item, self.frame, self.evaluator)
-
-    @property
-    def rest_field(self) -> DistanceField:
-        """What to collide with at rest."""
-        return field_at(self.item, None, self.evaluator)
+    def size(self) -> float:
+        """Metres, of what is worked on: rings that keep their size in the world are measured by it."""
+        return 1.0
 
     def hit(self, pointer: Pointer) -> Hit | None:
-        """Where the pointer meets the skin, or None."""
-        origin, direction = self.ray(pointer)
-        distance, triangle, barycentric = cast_rays(
-            self.skin.bvh, origin[None].astype(np.float32), direction[None].astype(np.float32))
-        if triangle[0] < 0:
-            return None
-        corners = self.skin.triangles.vertices[triangle[0]]
-        normal = barycentric[0].astype(np.float64) @ self.skin.normals[corners]
-        return Hit(
-            int(triangle[0]), barycentric[0], origin + float(distance[0]) * direction,
-            normal / max(float(np.linalg.norm(normal)), 1e-12),
-        )
+        """Where the pointer meets a skin; None beside it, or where a craft has none."""
+        return None
+
+    def opposite(self, hit: Hit) -> NDArray[np.float64]:
+        """The point (3,) on the other side of symmetry."""
+        return hit.point * [-1.0, 1.0, 1.0]
+
+    def pixels_per_metre(self, point: NDArray[np.float64] | None = None) -> float:
+        """Pixels a metre across the view covers at a point (3,) of the object; at its middle when None."""
+        return 1.0
 
     def ray(self, pointer: Pointer) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Origin (3,) and unit direction (3,) in object space of the line of sight through a pointer."""
@@ -157,26 +105,19 @@ class Ground:
         away = far - near
         return near, away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
 
-    def pixels_per_metre(self, point: NDArray[np.float64] | None = None) -> float:
-        """Pixels a metre across the view covers at a point (3,) of the object; at the middle of the skin when None."""
-        camera = self.sight.camera
-        scale = pixel_scale(camera, self.sight.height)
-        if camera.orthographic:
-            return scale
-        at = 0.5 * (self.skin.points.min(axis=0) + self.skin.points.max(axis=0)) if point is None else point
-        _, w = self.view.pixels(np.asarray(at, np.float64))
-        return scale / max(float(w), 1e-9)
+
+V = TypeVar("V")
 
 
-class Stroke(Protocol):
-    """One press, drag and release. `guides` are the newest ones, in the space that ``Ground.guides`` has."""
+class Stroke(Protocol[V]):
+    """One press, drag and release. `matter` is the newest, in the space in which the craft gave it at press."""
 
-    def extend(self, guides: Guides, pointers: tuple[Pointer, ...]) -> Guides:
-        """Guides after these samples (the press itself comes as the first batch, of one)."""
+    def extend(self, matter: V, pointers: tuple[Pointer, ...], /) -> V:
+        """The matter after these samples (the press itself comes as the first batch, of one)."""
         ...
 
-    def finish(self, guides: Guides) -> Guides:
-        """Guides at release."""
+    def finish(self, matter: V, /) -> V:
+        """The matter at release."""
         ...
 
     def overlays(self) -> Overlays:
@@ -213,7 +154,7 @@ class Tool(Generic[P]):
     name, label, icon : id, words, file in resources/icons without suffix. order : place in the shelf; tools of one
         tens stand together.
     tooltip : what it does and when, one teaching sentence. hint : what mouse and keys do now, for the status line.
-    step : name of the undo step. edits : what it changes; of the other things it is spared what is not respected.
+    step : name of the undo step. craft : the name of its craft. edits : what it changes, one of ``Craft.edits``.
     at_rest : works on the animal at rest (planting), not in the pose shown.
     with_shift, with_ctrl, with_eraser : what held keys or the eraser end of a pen turn it into, or None. Strokes never
         look at these keys themselves.
@@ -226,7 +167,8 @@ class Tool(Generic[P]):
     tooltip: ClassVar[str]
     hint: ClassVar[str]
     step: ClassVar[str]
-    edits: ClassVar[Edits] = "shape"
+    craft: ClassVar[str] = "groom"
+    edits: ClassVar[str] = "shape"
     at_rest: ClassVar[bool] = False
     with_shift: ClassVar[Turn | None] = None
     with_ctrl: ClassVar[Turn | None] = None
@@ -236,18 +178,13 @@ class Tool(Generic[P]):
     def __init__(self, params: P) -> None:
         self.params = params
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
-        """A new stroke at press. UserError when it cannot begin, in words that say what to do."""
+    def begin(self, ground: Any, pointer: Pointer) -> Stroke[Any]:
+        """A new stroke at press, on a ground of the tool's craft. UserError when it cannot begin says what to do."""
         raise NotImplementedError
 
-    def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
+    def hover(self, ground: Any, pointer: Pointer) -> Overlays:
         """What to draw over the picture at the pointer: the ring of brushes, nothing for others.
 
         Tools without a ring are not asked while a stroke goes on.
         """
         return ring_overlays(self.params, ground, pointer) if isinstance(self.params, RingParams) else ()
-
-
-def nothing_to_do() -> UserError:
-    """The same words everywhere for a groom without guides."""
-    return UserError("This groom has no guides yet; plant some first (the Plant or Scatter tool).")

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from core.document import Document, MeshObject
 from core.evaluator import Evaluator
 from core.mesh.mesh import Mesh
@@ -12,7 +15,7 @@ from core.mesh.normals import mesh_normals
 from core.mesh.skin import Posed, skin_at_rest
 from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
-from core.posed import moves, points_at
+from core.posed import held, moves, points_at, shown_points
 
 
 class _Kept(NamedTuple):
@@ -44,7 +47,9 @@ class PosedFrames:
         return self._used
 
     def posed(self, item: MeshObject, frame: float) -> Posed:
-        """The mesh at a frame, the same object as long as it is kept; at rest without a clip."""
+        """The mesh at a frame or in the pose it is held in, the same object as long as it is kept; else at rest."""
+        if held(item):
+            return self._evaluator.get(_posed, item.mesh, shown_points(item, frame, self._evaluator))
         if not moves(item):
             rest = skin_at_rest(item.mesh, self._evaluator)
             return Posed(rest.points, rest.normals)
@@ -90,3 +95,7 @@ class PosedFrames:
 
     def _remove(self, key: tuple[int, float]) -> None:
         self._used -= self._kept.pop(key).bytes
+
+
+def _posed(mesh: Mesh, points: NDArray[np.float32]) -> Posed:
+    return Posed(points, mesh_normals(mesh, points))

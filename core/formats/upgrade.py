@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 2
+FORMAT = 3
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -35,8 +35,13 @@ def coats_of_values(raw: Raw) -> Raw:
     return {**raw, "document": {**document, "grooms": [groom(old) for old in document["grooms"]]}}
 
 
+def held_poses(raw: Raw) -> Raw:
+    """2 -> 3: meshes may hold a pose and workspaces a craft; as there were none, nothing is to be changed."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
-UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values}
+UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values, 2: held_poses}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:

@@ -21,6 +21,8 @@ from tools.tool import Pointer, Turn
 
 REGISTRY = Registry(())
 TOOLS = REGISTRY.tools
+GROOM = [kind.name for kind in REGISTRY.of("groom")]
+POSE = [kind.name for kind in REGISTRY.of("pose")]
 HIDDEN = {"clone": {"source", "source_groom"}}  # what a stroke leaves in the settings; no panel shows it
 
 
@@ -30,10 +32,14 @@ def icons():
 
 def test_no_file_was_left_out_and_the_names_are_these():
     assert REGISTRY.troubles == []
-    assert list(TOOLS) == [
+    assert GROOM == [
         "plant", "scatter", "clone", "comb", "smooth", "length", "cut", "hairspray", "wash", "select", "lasso",
         "islands", "freeze", "delete", "measure",
     ]  # fmt: skip
+    assert POSE == [
+        "grab", "draw", "inflate", "sculpt_smooth", "relax", "pinch", "flatten", "restore", "mask", "weights",
+    ]  # fmt: skip
+    assert [*GROOM, *POSE] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)
 
 
@@ -46,8 +52,8 @@ def test_a_tool_describes_itself(name):
     assert 8 <= len(kind.tooltip.split()) <= 30
     assert kind.tooltip.endswith(".")
     assert ":" in kind.hint, "a hint says gesture: what it does"
-    assert kind.edits in ("shape", "hold", "selection", "nothing")
-    assert kind.__module__ == f"tools.groom.{name}"
+    assert kind.edits in REGISTRY.crafts[kind.craft].edits
+    assert kind.__module__.startswith(f"tools.{kind.craft}.")
     for turn in (kind.with_shift, kind.with_ctrl, kind.with_eraser):
         assert turn is None or (isinstance(turn, Turn) and turn.tool in TOOLS)
         if turn is not None:
@@ -109,7 +115,7 @@ def test_an_action_describes_itself(name):
 
 
 def test_the_eraser_does_the_opposite():
-    turns = {name: kind.with_eraser for name, kind in TOOLS.items() if kind.with_eraser is not None}
+    turns = {name: TOOLS[name].with_eraser for name in GROOM if TOOLS[name].with_eraser is not None}
     assert {name: (turn.tool, dict(turn.params)) for name, turn in turns.items()} == {
         "plant": ("delete", {}), "scatter": ("delete", {}), "comb": ("smooth", {}),
         "length": ("length", {"how": "shrink"}), "hairspray": ("wash", {}), "select": ("select", {"mode": "remove"}),
@@ -136,7 +142,7 @@ def test_held_keys_turn_a_tool_and_the_ring_keeps_its_size():
 
 
 STROKES = st.tuples(
-    st.sampled_from(sorted(TOOLS)), st.integers(0, 2**31 - 1), st.sampled_from([1001.0, 1004.0, BENT]),
+    st.sampled_from(sorted(GROOM)), st.integers(0, 2**31 - 1), st.sampled_from([1001.0, 1004.0, BENT]),
     st.booleans(), st.booleans(), st.booleans(),
 )
 

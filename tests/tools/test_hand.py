@@ -32,7 +32,7 @@ from tools.registry import Registry
 from tools.session import Session
 from tools.tool import Tool
 
-ALL = tuple(Registry(()).tools)
+ALL = tuple(kind.name for kind in Registry(()).of("groom"))
 WAY = line((150, 190), (250, 210))
 
 

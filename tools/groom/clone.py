@@ -11,8 +11,9 @@ from core.field import field
 from core.groom.clone import clone
 from core.groom.guides import Guides
 from core.overlay import Marker, Overlays, Polyline
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import RingParams, ring_overlays, ring_radius
-from tools.tool import Ground, Pointer, Stroke, Tool, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool
 
 PICK = 12.0  # pixels around the pointer within which a single strand is found
 MOST_SHOWN = 64  # strands of the source that are drawn
@@ -55,7 +56,7 @@ class Clone(Tool[CloneParams]):
     at_rest = True
     Params = CloneParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """Picks, or stamps what is picked."""
         if len(ground.guides) == 0:
             raise nothing_to_do()
@@ -63,7 +64,7 @@ class Clone(Tool[CloneParams]):
             return PickStroke(self.params, ground, pointer)
         return StampStroke(self.params, ground)
 
-    def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
+    def hover(self, ground: GroomGround, pointer: Pointer) -> Overlays:
         """The ring and what is picked."""
         ring = self.params.lock or self.params.onto == "strands"
         found = ring_overlays(self.params, ground, pointer) if ring else ()
@@ -72,7 +73,7 @@ class Clone(Tool[CloneParams]):
             return found
         return found + tuple(Polyline(line, "accent", 2.0) for line in ground.screen.pixels[rows])
 
-    def _picked(self, ground: Ground) -> np.ndarray:
+    def _picked(self, ground: GroomGround) -> np.ndarray:
         """(G,) bool: what is picked of this groom."""
         if self.params.source_groom != ground.groom.id or not self.params.source:
             return np.zeros(len(ground.guides), np.bool_)
@@ -82,7 +83,7 @@ class Clone(Tool[CloneParams]):
 class PickStroke:
     """Picks at press."""
 
-    def __init__(self, params: CloneParams, ground: Ground, pointer: Pointer) -> None:
+    def __init__(self, params: CloneParams, ground: GroomGround, pointer: Pointer) -> None:
         place = np.array([[pointer.x, pointer.y]], np.float64)
         if params.lock:
             radius = ring_radius(params, ground, pointer)
@@ -113,7 +114,7 @@ class PickStroke:
 class StampStroke:
     """Stamps at press; until the release the stamp follows the hand."""
 
-    def __init__(self, params: CloneParams, ground: Ground) -> None:
+    def __init__(self, params: CloneParams, ground: GroomGround) -> None:
         self.params, self.ground = params, ground
         self.last: Pointer | None = None
 

@@ -14,8 +14,9 @@ from core.groom.guides import Guides
 from core.groom.region import facing
 from core.overlay import Overlays, Polyline
 from tools.brush import BrushStroke
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import BrushParams, ring_strength
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 FULL_TILT = math.radians(60.0)  # what pens report at the most
 STEEPEST = 1.3  # radians, what the kernel takes
@@ -57,7 +58,7 @@ class Comb(Tool[CombParams]):
     with_eraser = Turn("smooth")
     Params = CombParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke of the comb."""
         if len(ground.guides) == 0:
             raise nothing_to_do()
@@ -67,7 +68,7 @@ class Comb(Tool[CombParams]):
 class CombStroke(BrushStroke[CombParams]):
     """Combs along the way since the last batch."""
 
-    def __init__(self, params: CombParams, ground: Ground) -> None:
+    def __init__(self, params: CombParams, ground: GroomGround) -> None:
         super().__init__(params, ground)
         # the side that is seen is settled at press: hair must not drop out of a stroke as it turns
         self.mask = None if params.through else facing(ground.guides, ground.view)

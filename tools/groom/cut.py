@@ -12,8 +12,9 @@ from core.groom.length import cut_at_line, cut_with_ring
 from core.groom.region import editable
 from core.overlay import Overlays, Polyline
 from tools.brush import BrushStroke, on_rows
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import ReachParams, ring_overlays
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 SHORTEST = 1e-4  # of the animal's diagonal
 
@@ -41,13 +42,13 @@ class Cut(Tool[CutParams]):
     with_ctrl = Turn("cut", {"how": "line"})
     Params = CutParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke of the scissors."""
         if len(ground.guides) == 0:
             raise nothing_to_do()
         return RingCut(self.params, ground) if self.params.how == "ring" else LineCut(self.params, ground)
 
-    def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
+    def hover(self, ground: GroomGround, pointer: Pointer) -> Overlays:
         """The ring; nothing for a line."""
         return ring_overlays(self.params, ground, pointer) if self.params.how == "ring" else ()
 
@@ -67,7 +68,7 @@ class RingCut(BrushStroke[CutParams]):
 class LineCut(BrushStroke[CutParams]):
     """Draws a line and cuts at release."""
 
-    def __init__(self, params: CutParams, ground: Ground) -> None:
+    def __init__(self, params: CutParams, ground: GroomGround) -> None:
         super().__init__(params, ground)
         self.line: list[tuple[float, float]] = []
 

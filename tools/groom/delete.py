@@ -10,8 +10,9 @@ from core.field import field
 from core.groom.delete import delete
 from core.groom.guides import Guides
 from tools.brush import BrushStroke
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import ReachParams
-from tools.tool import Ground, Pointer, Stroke, Tool, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool
 
 
 class DeleteParams(ReachParams):
@@ -35,7 +36,7 @@ class Delete(Tool[DeleteParams]):
     step = "Delete"
     Params = DeleteParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that deletes."""
         if len(ground.guides) == 0:
             raise nothing_to_do()
@@ -45,7 +46,7 @@ class Delete(Tool[DeleteParams]):
 class DeleteStroke(BrushStroke[DeleteParams]):
     """Deletes along the way."""
 
-    def __init__(self, params: DeleteParams, ground: Ground) -> None:
+    def __init__(self, params: DeleteParams, ground: GroomGround) -> None:
         super().__init__(params, ground)
         self.only_selected = bool(ground.guides.selected.any())
 

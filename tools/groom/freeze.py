@@ -10,8 +10,9 @@ from core.field import field
 from core.groom.freeze import freeze, unfreeze
 from core.groom.guides import Guides
 from tools.brush import BrushStroke
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import ReachParams
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 
 class FreezeParams(ReachParams):
@@ -38,7 +39,7 @@ class Freeze(Tool[FreezeParams]):
     with_eraser = Turn("freeze", {"how": "thaw"})
     Params = FreezeParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that freezes or thaws."""
         if len(ground.guides) == 0:
             raise nothing_to_do()

@@ -8,8 +8,9 @@ from core.field import field
 from core.groom.guides import Guides
 from core.groom.hairspray import spray
 from tools.brush import BrushStroke, on_rows
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import BrushParams
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 PASS = 2.0  # hold that a way of one radius adds at strength 1: a pass locks what the inner half of the ring goes over
 
@@ -38,7 +39,7 @@ class Hairspray(Tool[HairsprayParams]):
     with_eraser = Turn("wash")
     Params = HairsprayParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that sprays."""
         if len(ground.guides) == 0:
             raise nothing_to_do()

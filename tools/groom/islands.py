@@ -12,7 +12,8 @@ from core.groom.select import pieces, select
 from core.mesh.surface import root_vertices
 from core.overlay import Overlays
 from core.record import Record
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.groom.craft import GroomGround, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 
 class IslandsParams(Record):
@@ -39,7 +40,7 @@ class Islands(Tool[IslandsParams]):
     with_eraser = Turn("islands", {"mode": "remove"})
     Params = IslandsParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A click."""
         if len(ground.guides) == 0:
             raise nothing_to_do()
@@ -49,7 +50,7 @@ class Islands(Tool[IslandsParams]):
 class IslandsStroke:
     """Selects what the last sample was over, at release."""
 
-    def __init__(self, params: IslandsParams, ground: Ground) -> None:
+    def __init__(self, params: IslandsParams, ground: GroomGround) -> None:
         self.params, self.ground = params, ground
         self.last: Pointer | None = None
 

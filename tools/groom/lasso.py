@@ -12,7 +12,8 @@ from core.groom.region import facing
 from core.groom.select import select_in_lasso
 from core.overlay import Overlays, Polyline
 from core.record import Record
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.groom.craft import GroomGround, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 
 class LassoParams(Record):
@@ -43,7 +44,7 @@ class Lasso(Tool[LassoParams]):
     with_eraser = Turn("lasso", {"mode": "remove"})
     Params = LassoParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """An outline."""
         if len(ground.guides) == 0:
             raise nothing_to_do()
@@ -53,7 +54,7 @@ class Lasso(Tool[LassoParams]):
 class LassoStroke:
     """Draws the outline and selects at release."""
 
-    def __init__(self, params: LassoParams, ground: Ground) -> None:
+    def __init__(self, params: LassoParams, ground: GroomGround) -> None:
         self.params, self.ground = params, ground
         self.outline: list[tuple[float, float]] = []
 

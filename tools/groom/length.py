@@ -10,8 +10,9 @@ from core.field import field
 from core.groom.guides import Guides
 from core.groom.length import lengths, set_length
 from tools.brush import BrushStroke, on_rows
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import BrushParams
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 RATE = 0.25  # at strength 1 hair grows by exp of this on a way of one radius: half as long again in a pass over it
 APPROACH = 3.0  # and comes to within exp of minus this of a length
@@ -46,7 +47,7 @@ class Length(Tool[LengthParams]):
     with_eraser = Turn("length", {"how": "shrink"})
     Params = LengthParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that grows, shrinks or sets."""
         if len(ground.guides) == 0:
             raise nothing_to_do()

@@ -11,7 +11,8 @@ from core.groom.guides import Guides
 from core.groom.length import lengths
 from core.overlay import Label, Marker, Overlays, Polyline
 from core.record import Record
-from tools.tool import Ground, Hit, Pointer, Stroke, Tool
+from tools.groom.craft import GroomGround
+from tools.tool import Hit, Pointer, Stroke, Tool
 
 PICK = 12.0  # pixels around the pointer within which a hair is found
 
@@ -33,11 +34,11 @@ class Measure(Tool[MeasureParams]):
     edits = "nothing"
     Params = MeasureParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A distance."""
         return MeasureStroke(ground)
 
-    def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
+    def hover(self, ground: GroomGround, pointer: Pointer) -> Overlays:
         """The hair under the pointer and its figures."""
         row = ground.screen.nearest((pointer.x, pointer.y), PICK) if len(ground.guides) else None
         if row is None:
@@ -49,7 +50,7 @@ class Measure(Tool[MeasureParams]):
 class MeasureStroke:
     """A straight line between two places on the skin."""
 
-    def __init__(self, ground: Ground) -> None:
+    def __init__(self, ground: GroomGround) -> None:
         self.ground = ground
         self.start: Hit | None = None
         self.ends: tuple[Pointer, Pointer] | None = None
@@ -79,7 +80,7 @@ class MeasureStroke:
         return (line, Marker(a.x, a.y), Marker(b.x, b.y), Label(b.x + 14.0, b.y - 10.0, in_words(self.ground, metres)))
 
 
-def hair_in_words(ground: Ground, row: int) -> str:
+def hair_in_words(ground: GroomGround, row: int) -> str:
     """Length, number of points and angle to the skin of one hair."""
     points = ground.shown.points[row].astype(np.float64)
     first = points[1] - points[0]
@@ -89,6 +90,6 @@ def hair_in_words(ground: Ground, row: int) -> str:
     return f"{in_words(ground, metres)}, {len(points)} points, {angle:.0f}° off the skin"
 
 
-def in_words(ground: Ground, metres: float) -> str:
+def in_words(ground: GroomGround, metres: float) -> str:
     """A length in the document's unit."""
     return f"{metres / METRES_PER_UNIT[ground.unit]:.4g} {ground.unit}"

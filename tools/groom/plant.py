@@ -13,8 +13,9 @@ from core.groom.plant import plant
 from core.groom.rows import append_guides
 from core.overlay import Marker, Overlays
 from core.record import Record
+from tools.groom.craft import GroomGround
 from tools.places import directions_at_rest, places_under
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 STEP = 2.0  # pixels between the places that are tried along a drag
 BACK = 10.0  # pixels of the way that tell the direction of a drag
@@ -52,7 +53,7 @@ class Plant(Tool[PlantParams]):
     with_eraser = Turn("delete")
     Params = PlantParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A click or a row."""
         return PlantStroke(self.params, ground)
 
@@ -60,7 +61,7 @@ class Plant(Tool[PlantParams]):
 class PlantStroke:
     """Plants along the way. The first guide waits until it is known where the hand goes, or for the release."""
 
-    def __init__(self, params: PlantParams, ground: Ground) -> None:
+    def __init__(self, params: PlantParams, ground: GroomGround) -> None:
         self.params, self.ground = params, ground
         self.spacing = params.spacing or SPACING * ground.rest.diagonal
         self.last: Pointer | None = None

@@ -16,9 +16,10 @@ from core.groom.maps import density_at
 from core.groom.plant import plant, plant_scatter
 from core.groom.rows import append_guides
 from core.overlay import Overlays
+from tools.groom.craft import GroomGround
 from tools.places import Places, places_under
 from tools.ring import RingParams, ring_overlays, ring_radius
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 SPACING = 0.015  # of the animal's diagonal, where none is given
 TRIES = 6.0  # places tried for each that would fit
@@ -62,17 +63,17 @@ class Scatter(Tool[ScatterParams]):
     with_eraser = Turn("delete")
     Params = ScatterParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A drag that fills, or a click that scatters a count."""
         if self.params.how == "ring":
             return RingScatter(self.params, ground)
         return CountScatter(self.params, ground, None if self.params.how == "everywhere" else self._map(ground))
 
-    def hover(self, ground: Ground, pointer: Pointer) -> Overlays:
+    def hover(self, ground: GroomGround, pointer: Pointer) -> Overlays:
         """The ring, where it is used."""
         return ring_overlays(self.params, ground, pointer) if self.params.how == "ring" else ()
 
-    def _map(self, ground: Ground) -> Map:
+    def _map(self, ground: GroomGround) -> Map:
         name = self.params.map or ground.groom.coat.density_map or ""
         found = ground.groom.map(name)
         if found is None:
@@ -84,7 +85,7 @@ class Scatter(Tool[ScatterParams]):
 class RingScatter:
     """Plants where the ring passes until no place is farther than the spacing from a guide."""
 
-    def __init__(self, params: ScatterParams, ground: Ground) -> None:
+    def __init__(self, params: ScatterParams, ground: GroomGround) -> None:
         self.params, self.ground = params, ground
         self.spacing = params.spacing or SPACING * ground.rest.diagonal
         self.roots = ground.guides.points[:, 0].astype(np.float64)
@@ -156,7 +157,7 @@ class RingScatter:
 class CountScatter:
     """Plants an exact number at release."""
 
-    def __init__(self, params: ScatterParams, ground: Ground, where: Map | None) -> None:
+    def __init__(self, params: ScatterParams, ground: GroomGround, where: Map | None) -> None:
         self.params, self.ground, self.where = params, ground, where
 
     def extend(self, guides: Guides, pointers: tuple[Pointer, ...]) -> Guides:

@@ -10,8 +10,9 @@ from core.field import field
 from core.groom.guides import Guides
 from core.groom.select import select
 from tools.brush import BrushStroke
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import ReachParams
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 
 class SelectParams(ReachParams):
@@ -40,7 +41,7 @@ class Select(Tool[SelectParams]):
     with_eraser = Turn("select", {"mode": "remove"})
     Params = SelectParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that selects."""
         if len(ground.guides) == 0:
             raise nothing_to_do()

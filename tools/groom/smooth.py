@@ -16,8 +16,9 @@ from core.mesh.roots import Roots
 from core.mesh.surface import root_positions
 from core.record import freeze
 from tools.brush import BrushStroke
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import BrushParams
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 
 class SmoothParams(BrushParams):
@@ -43,7 +44,7 @@ class Smooth(Tool[SmoothParams]):
     with_ctrl = Turn("comb")
     Params = SmoothParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that smooths."""
         if len(ground.guides) == 0:
             raise nothing_to_do()

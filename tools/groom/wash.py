@@ -5,8 +5,9 @@ from __future__ import annotations
 from core.groom.guides import Guides
 from core.groom.hairspray import wash
 from tools.brush import BrushStroke, on_rows
+from tools.groom.craft import GroomGround, nothing_to_do
 from tools.ring import BrushParams
-from tools.tool import Ground, Pointer, Stroke, Tool, Turn, nothing_to_do
+from tools.tool import Pointer, Stroke, Tool, Turn
 
 PASS = 2.0  # hold that a way of one radius takes away at strength 1
 
@@ -29,7 +30,7 @@ class Wash(Tool[WashParams]):
     with_ctrl = Turn("hairspray")
     Params = WashParams
 
-    def begin(self, ground: Ground, pointer: Pointer) -> Stroke:
+    def begin(self, ground: GroomGround, pointer: Pointer) -> Stroke[Guides]:
         """A stroke that washes."""
         if len(ground.guides) == 0:
             raise nothing_to_do()

@@ -8,9 +8,17 @@ from numpy.typing import NDArray
 from core.groom.guides import Guides
 from core.mesh.roots import Roots
 from core.mesh.skin import Skin
-from core.mesh.surface import rest_from_posed, root_frames, strands_on_deformed
+from core.mesh.surface import (
+    Carried,
+    Ranges,
+    rest_from_posed,
+    rest_from_posed_again,
+    root_frames,
+    strands_on_deformed,
+)
 from core.record import freeze
 from core.rows import changed_rows
+from core.workers import serial_ranges
 from tools.respect import rows_of
 
 
@@ -30,11 +38,12 @@ class BackToRest:
     Parameters
     ----------
     shown : as they were in the pose before the edit. before : as they were at rest. skin : of the pose.
+    ranges : threads.
     """
 
-    def __init__(self, shown: Guides, before: Guides, skin: Skin) -> None:
-        self.shown, self.before, self.skin = shown, before, skin
-        self._posed, self._rest = shown.points, before.points  # of one shape, the newest known to belong together
+    def __init__(self, shown: Guides, before: Guides, skin: Skin, ranges: Ranges = serial_ranges) -> None:
+        self.shown, self.before, self.skin, self._ranges = shown, before, skin, ranges
+        self._start = self._last = Carried(shown.points, before.points)
 
     def __call__(self, guides: Guides) -> Guides:
         """Edited guides of the pose at rest."""
@@ -45,17 +54,11 @@ class BackToRest:
     def _carried(self, guides: Guides) -> NDArray[np.float32]:
         if guides.points is self.shown.points:
             return self.before.points
-        moved = changed_rows(self._posed, guides.points)
-        now = guides.points[moved]
-        rest = self._back(self.before.roots.take(moved), now)
-        rest[:, 0] = self.before.points[moved, 0]
-        points = self._rest.copy()
-        points[moved] = rest
-        # a strand that came back to where it was has its old bits again
-        back = np.delete(moved, changed_rows(self.shown.points[moved], now))
-        points[back] = self.before.points[back]
-        self._posed, self._rest = guides.points, freeze(points)
-        return self._rest
+        rest = rest_from_posed_again(
+            guides.points, self._last, self._start, self.shown.roots.frames, self.before.roots.frames, self._ranges
+        )
+        self._last = Carried(guides.points, freeze(rest))
+        return rest
 
     def _rearranged(self, guides: Guides) -> Guides:
         """Where guides went, or have another number of points."""
