@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from core.errors import UserError
 from core.pose.blend_shapes import BlendShapes
 from core.pose.skeleton import Clip, Skeleton, SkinWeights
 from core.record import Record, column, number, text
+
+ConstraintKind = Literal["limit", "aim", "point", "orient"]
 
 
 class Control(Record):
@@ -52,6 +55,37 @@ class Control(Record):
                 raise ValueError(f"Control {self.name!r} must name at least one vertex")
 
 
+class Constraint(Record):
+    """One constraint of a joint.
+
+    kind : "limit" keeps its XYZ angles within `low` .. `high`, radians relative to rest; "aim" turns it so that its
+        own `axis` points at the origin of `target`; "point" moves its origin to where `target` is, as far from it as
+        at rest; "orient" turns it in object space as `target` is turned from its rest.
+    weight : how much of it is done, 0 .. 1; a limit always holds whole.
+    """
+
+    joint: str
+    kind: ConstraintKind
+    target: str | None = None
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    low: tuple[float, float, float] = (-math.pi, -math.pi / 2, -math.pi)
+    high: tuple[float, float, float] = (math.pi, math.pi / 2, math.pi)
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        text(self, "joint")
+        if self.kind not in get_args(ConstraintKind):
+            raise ValueError(f"Constraint.kind must be one of {', '.join(get_args(ConstraintKind))}")
+        number(self, "axis", "low", "high", least=-1e6, most=1e6)
+        number(self, "weight", least=0.0, most=1.0)
+        if (self.kind == "limit") != (self.target is None) or self.target == self.joint:
+            raise ValueError(f"Constraint of {self.joint!r} must name another joint as target, or none for a limit")
+        if any(a > b for a, b in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"Constraint of {self.joint!r} has a lowest angle above its highest")
+        if not any(self.axis):
+            raise ValueError(f"Constraint of {self.joint!r} needs an axis")
+
+
 class Rig(Record):
     """What moves a mesh: first its blend shapes, then its skeleton.
 
@@ -60,6 +94,7 @@ class Rig(Record):
     shapes : blend shapes; the number of a control of the same name is their weight.
     skinning : "linear" blend, or "dual-quaternion" (Kavan et al. 2008), which keeps volume in a twist.
     controls : abstract controls, one for each shape first; names are unique among themselves and the joints.
+    constraints : what joints may do, and do because of others, while a pose is made by hand; in this order.
     file_vertices : (W,) int32, vertex of the mesh for each vertex of the file it was read from, None when they are the
         same: seams split by UVs are welded in the mesh, and results for other programs are ``points[file_vertices]``.
     """
@@ -71,6 +106,7 @@ class Rig(Record):
     shapes: BlendShapes | None = None
     skinning: Literal["linear", "dual-quaternion"] = "linear"
     controls: tuple[Control, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
     file_vertices: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -96,6 +132,9 @@ class Rig(Record):
                 raise ValueError(f"Control {control.name!r} names a vertex the skin does not have")
             if control.joint is not None and control.joint not in self.skeleton.names:
                 raise ValueError(f"Control {control.name!r} names a joint the skeleton does not have")
+        for one in self.constraints:
+            if not {one.joint, one.target or one.joint} <= set(self.skeleton.names):
+                raise ValueError(f"Rig.constraints name a joint that the skeleton does not have: {one.joint!r}")
         if self.file_vertices is not None:
             column(self, "file_vertices", np.int32, (None,))
             if self.file_vertices.size and not (self.file_vertices.min() >= 0 and self.file_vertices.max() < vertices):
