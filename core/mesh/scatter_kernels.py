@@ -211,7 +211,7 @@ def test_candidates(  # type: ignore[no-untyped-def]
     enough = np.float32(max(ENOUGH * radius, last_radius) ** 2)
     before = accepted
     for at in range(start, stop):
-        c = active[at]
+        c = np.uintp(active[at])
         if wake[c] != level:
             continue
         x, y, z, own, t = places[c, 0], places[c, 1], places[c, 2], stretch[c], triangle[c]
@@ -241,15 +241,16 @@ def test_candidates(  # type: ignore[no-untyped-def]
                 if away > best * widest:
                     continue
                 i, j, k = i0 + di * (corner & 1), j0 + dj * (corner >> 1 & 1), k0 + dk * (corner >> 2)
-                b = _bucket(octave, i, j, k, mask)
-                row, end = firsts[b], np.int32(-1) if accepting else firsts[b + 1]
+                b = np.uintp(_bucket(octave, i, j, k, mask))
+                row, end = firsts[b], np.int32(-1) if accepting else firsts[b + np.uintp(1)]
                 while row != end:
-                    dx, dy, dz = roots[row, 0] - x, roots[row, 1] - y, roots[row, 2] - z
+                    r = np.uintp(row)
+                    dx, dy, dz = roots[r, 0] - x, roots[r, 1] - y, roots[r, 2] - z
                     d2 = dx * dx + dy * dy + dz * dz
-                    both = min(own, roots[row, 3])
+                    both = min(own, roots[r, 3])
                     both *= both
                     if d2 < best * both:
-                        u = faces[row]
+                        u = faces[r]
                         facing = np.float32(1.0)
                         if u != t:
                             facing = (
@@ -258,7 +259,7 @@ def test_candidates(  # type: ignore[no-untyped-def]
                             )
                         if facing > SAME_SIDE:
                             best = d2 / both
-                    row = links[row] if accepting else row + np.int32(1)
+                    row = links[r] if accepting else row + np.int32(1)
                 if best < enough:
                     break  # it sleeps long anyway; waking a little early does no harm
         if best < limit:
