@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
 # what a command changes; only changes of the document are undo steps
 Touches = Literal["document", "history", "workspace", "file", "settings", "window"]
-# where its hotkey works: the same key may mean different things over different parts of the window
-Scope = Literal["everywhere", "viewport", "outliner"]
+# where its hotkey works: the same key may mean different things over different parts of the window, and over the view
+# in different crafts
+Scope = Literal["everywhere", "viewport", "outliner", "groom", "pose"]
+CRAFT_SCOPES: tuple[Scope, ...] = ("groom", "pose")
 
 MOST_RECENT = 20
 

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.window.commands import Command, Commands, Scope
+from app.window.commands import CRAFT_SCOPES, Command, Commands, Scope
 from app.window.icons import icon, icon_names
 from app.window.keymap import HELD, Keymap
 
@@ -118,7 +118,9 @@ class Hotkeys(QObject):
     def _pressed(self, text: str) -> None:
         _, owners = self._shortcuts[text]
         scope = self.scope()
-        name = owners.get(scope) if scope is not None else None
+        craft = self._commands.desk.workspace.craft
+        own = [owners[s] for s in CRAFT_SCOPES if s == craft and s in owners] if scope == "viewport" else []
+        name = own[0] if own else owners.get(scope) if scope is not None else None
         name = name or owners.get("everywhere")
         if name is not None:
             self._commands.run(name)
@@ -130,7 +132,9 @@ class Hotkeys(QObject):
     def _follow_focus(self, *_: object) -> None:
         scope = self.scope()
         for shortcut, owners in self._shortcuts.values():
-            shortcut.setEnabled("everywhere" in owners or scope in owners)
+            shortcut.setEnabled(
+                "everywhere" in owners or scope in owners
+                or (scope == "viewport" and any(s in owners for s in CRAFT_SCOPES)))
 
     def _text(self, name: str) -> str:
         key = self.keymap.shown(name)

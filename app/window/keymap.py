@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 from PySide6.QtGui import QKeySequence
 
-from app.window.commands import Scope
+from app.window.commands import CRAFT_SCOPES, Scope
 from app.window.settings import read_strictly, settings_folder, write_whole
 from core.errors import UserError
 from core.record import Record
@@ -173,7 +173,11 @@ def conflicts(keymap: Keymap, scopes: Mapping[str, Scope]) -> tuple[Conflict, ..
 
 
 def _meets(scope: Scope, others: Iterable[tuple[str, Scope]]) -> bool:
-    return any("everywhere" in (scope, other) or scope == other for _, other in others)
+    def meets(other: Scope) -> bool:
+        in_view = "viewport" in (scope, other) and (scope in CRAFT_SCOPES or other in CRAFT_SCOPES)
+        return "everywhere" in (scope, other) or scope == other or in_view
+
+    return any(meets(other) for _, other in others)
 
 
 def _written(one: Gesture) -> str:

@@ -29,7 +29,9 @@ from core.errors import UserError
 _MODIFIER_KEYS = {
     Qt.Key.Key_Control, Qt.Key.Key_Shift, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr, Qt.Key.Key_unknown,
     Qt.Key.Key_Super_L, Qt.Key.Key_Super_R}
-WHERE = {"everywhere": "everywhere", "viewport": "over the view", "outliner": "in the scene panel"}
+WHERE = {
+    "everywhere": "everywhere", "viewport": "over the view", "outliner": "in the scene panel",
+    "groom": "over the view, grooming", "pose": "over the view, posing"}
 
 
 class KeyCapture(QLineEdit):

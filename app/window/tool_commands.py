@@ -67,7 +67,7 @@ def tool_command(tool: type[Tool[Any]]) -> Command:
     """The command that takes a tool into the hand."""
     return Command(
         f"tool.{tool.name}", tool.label, tool.tooltip, _choose(tool.name), _CHOOSE, checked=_is_chosen(tool.name),
-        icon=tool.icon, scope="viewport", words="tool brush")
+        icon=tool.icon, scope="pose" if tool.craft == "pose" else "groom", words=f"tool brush {tool.craft}")
 
 
 def tool_commands(registry: Registry) -> tuple[Command, ...]:
