@@ -205,7 +205,8 @@ def test_candidates(  # type: ignore[no-untyped-def]
     When a root is clearly near, or nearer than the `last_radius` that is going to be asked for, no nearer one is looked
     for: that changes when a candidate is tested, never what becomes a root. Two roots of different
     stretch keep the distance of the smaller one, so that a ball never leaves 8 cells. Returns how many roots there
-    are. (One function, for calls with arrays cost as much as the search.)
+    are. (One function, for calls with arrays cost as much as the search. Rows are unsigned: for signed ones
+    numba asks at every access whether they count from the end.)
     """
     limit = np.float32(radius * radius)
     enough = np.float32(max(ENOUGH * radius, last_radius) ** 2)

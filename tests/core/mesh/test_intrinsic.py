@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
-from core.mesh.intrinsic import HELPER, Binding, SurfaceSites, bind
+from core.mesh.intrinsic import HELPER, WORTH_A_PART, Binding, Rebound, SurfaceSites, bind
 from core.mesh.scatter import scatter
+from core.workers import Workers
 from tests.core.mesh import skin_samples as skins
 
 
@@ -294,6 +295,34 @@ def test_the_same_input_gives_the_same_bits() -> None:
     a, b = bind(*args), bind(*args)
     assert np.array_equal(a.sites, b.sites)
     assert np.array_equal(a.weights, b.weights)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_any_number_of_threads_gives_the_same_bits_and_goes_on_alike(threads: int) -> None:
+    points, triangles = skins.ball()
+    skin = skins.joined((points, triangles), (points * [1.0, 0.5, 0.8] + [4.0, 0.0, 0.0], triangles))
+    rng = np.random.default_rng(3)
+    sites, tracked = skins.sample(skin, 300, rng), skins.sample(skin, threads * WORTH_A_PART, rng)
+    triangle, bary = (column[0] for column in skins.sample(skin, 1, rng))
+    workers = Workers(threads)
+    alone, shared = SurfaceSites(*skin, *sites, *tracked), SurfaceSites(*skin, *sites, *tracked, workers=workers)
+    bound = alone.binding()
+    its = np.sort(bound.sites[bound.order], axis=1)
+    assert np.count_nonzero((its[1:] != its[:-1]).any(axis=1)) < 2 * 300  # a run for each triangle of sites
+    for edit in (
+        lambda net: net.binding()[:3],
+        lambda net: rebound_in_order(net.add_site(triangle, bary)),
+        lambda net: rebound_in_order(net.remove_site(17)),
+    ):
+        for one, other in zip(edit(alone), edit(shared), strict=True):
+            np.testing.assert_array_equal(one, other)
+    workers.close()
+
+
+def rebound_in_order(rebound: Rebound) -> tuple[np.ndarray, ...]:
+    order = np.argsort(rebound.rows)
+    assert len(order) > 0
+    return tuple(column[order] for column in rebound)
 
 
 def test_no_site_is_refused() -> None:
