@@ -85,10 +85,10 @@ class Hand:
         craft, grounds = self.craft(tool.craft), self._grounds(sight, tool)
         self._pen = Pen(self.pen)
         (first,) = self._pen.filtered((pointer,))
+        self._bare = not craft.ready(tool, grounds[0])  # asked first: what gets ready meanwhile, begin may have missed
         self._strokes = [(tool.begin(ground, first), ground) for ground in grounds]
         self._tool, self._matter = tool, craft.matter(tool, grounds[0])
         self._batches = []
-        self._bare = not craft.ready(tool, grounds[0])
         work = self.preparation() if self._bare else None
         if work is not None:
             Thread(target=work, name="skin for the hand", daemon=True).start()
@@ -207,7 +207,7 @@ class Hand:
         craft = self.craft(self._tool.craft)
         try:
             before = self._matter
-            if self._bare and craft.ready(self._tool, self._strokes[0][1]):
+            if self._bare and self._batches and craft.ready(self._tool, self._strokes[0][1]):
                 self._make_again()
             self._apply(pointers)
             if self._matter is not before:

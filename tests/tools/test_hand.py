@@ -459,3 +459,18 @@ def test_a_stroke_goes_through_the_skin_only_until_it_is_there():
     s.hand.cancel()
     assert s.document is s.history.current
     s.close(discard=True)
+
+
+def test_what_gets_ready_between_the_press_and_its_first_sample_is_no_stumbling_block():
+    def stroked(at_once):
+        s = Session(document(), Workspace(frame=BENT), evaluator=Evaluator())
+        s.hand.waits = False
+        s.choose("cut")
+        work = s.hand.preparation()
+        # another thread may be as quick as this: after the stroke began without the skin, before its first sample
+        s.hand.preparation = (lambda: work() and None) if at_once else (lambda: None)
+        s.hand.stroke(sight(), line((200, 130), (215, 240), 6))
+        s.close(discard=True)
+        return guides_of(s).points
+
+    np.testing.assert_array_equal(stroked(True), stroked(False))
