@@ -37,7 +37,8 @@ def test_no_file_was_left_out_and_the_names_are_these():
         "islands", "freeze", "delete", "measure",
     ]  # fmt: skip
     assert POSE == [
-        "grab", "draw", "inflate", "sculpt_smooth", "relax", "pinch", "flatten", "restore", "mask", "weights",
+        "rotate", "move", "ik", "grab", "draw", "inflate", "sculpt_smooth", "relax", "pinch", "flatten", "restore",
+        "mask", "weights",
     ]  # fmt: skip
     assert [*GROOM, *POSE] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,13 @@ if TYPE_CHECKING:
 
 Points = NDArray[np.float32]
 Way = Literal["topology", "axis"]
+
+
+class Posing(NamedTuple):
+    """What manipulators change: the pose that is held, None while it is that of the clip, and the selected joints."""
+
+    pose: Pose | None
+    selection: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +100,7 @@ class PoseCraft:
     name = "pose"
     label = "Pose"
     first = "grab"
-    edits = ("surface", "mask", "weights", "pose", "selection")
+    edits = ("surface", "mask", "weights", "posing")
 
     def __init__(self) -> None:
         self._known: tuple[tuple[Any, ...], tuple[PoseGround, ...]] | None = None
@@ -117,12 +124,12 @@ class PoseCraft:
         return grounds
 
     def matter(self, tool: Tool[Any], ground: PoseGround) -> Any:
-        """What the tool changes: vertices as shown, mask, weights, pose, or selected joints."""
+        """What the tool changes: vertices as shown, mask, weights, or the pose and its joints."""
         item = ground.item
         mask = np.zeros(len(item.mesh.points), np.float32) if item.mask is None else item.mask
         return {
-            "surface": ground.skin.points, "mask": mask, "weights": ground.rig.skin, "pose": ground.pose,
-            "selection": item.joint_selection,
+            "surface": ground.skin.points, "mask": mask, "weights": ground.rig.skin,
+            "posing": Posing(item.pose, item.joint_selection),
         }[tool.edits]
 
     def shown(self, document: Document, tool: Tool[Any], ground: PoseGround, matter: Any) -> Document:
@@ -130,14 +137,16 @@ class PoseCraft:
         item = ground.item
         if tool.edits == "surface":
             return with_mesh(document, item.replace(surface=freeze(matter)))
-        changes = {"mask": "mask", "pose": "pose", "selection": "joint_selection"}
-        if tool.edits in changes:
-            return with_mesh(document, item.replace(**{changes[tool.edits]: matter}))
+        if tool.edits == "posing":
+            return with_mesh(document, item.replace(pose=matter.pose, joint_selection=matter.selection))
+        if tool.edits == "mask":
+            return with_mesh(document, item.replace(mask=matter))
         return with_mesh(document, item.replace(rig=ground.rig.replace(skin=cast(SkinWeights, matter))))
 
     def document(self, document: Document, tool: Tool[Any], ground: PoseGround, matter: Any) -> Document:
         """The document with what the tool changed, sculpts in the layers of their poses."""
-        if matter is self.matter(tool, ground):
+        before = self.matter(tool, ground)
+        if matter is before or (tool.edits == "posing" and matter == before):
             return document
         item = ground.item
         if tool.edits == "surface":

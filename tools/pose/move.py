@@ -1,0 +1,179 @@
+"""Move: arrows along the axes of the active joint; a drag moves the selected joints in their parents."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from core.document import METRES_PER_UNIT
+from core.field import field
+from core.overlay import Circle, Label, Overlays, Polyline
+from core.pose.pose import SAME, Pose, Vector
+from core.transform import Array
+from tools.pose.craft import PoseGround, Posing
+from tools.pose.posing import (
+    AXES,
+    HANDLE,
+    Joints,
+    ManipulatorParams,
+    PosingStroke,
+    dots,
+    frame_of,
+    joints_of,
+    metres_per_pixel,
+    pick,
+    selected,
+    towards_eye,
+)
+from tools.tool import Pointer, Stroke, Tool, Turn
+
+FREE = 3  # the handle in the middle: across the line of sight
+LEAST = 0.05  # of an arrow that is seen end on: how long it must look to be dragged along
+
+
+class MoveParams(ManipulatorParams):
+    """Settings of Move."""
+
+    snap: Annotated[float, field(
+        "Snap", "Moves go in whole steps of so many metres; 0 lets them go freely.", "m", (0, 0.1), (0, 1e4))] = 0.0
+
+
+class Move(Tool[MoveParams]):
+    """Moves joints."""
+
+    name = "move"
+    label = "Move"
+    icon = "move"
+    order = 101
+    tooltip = "Moves the selected joints along arrows, or freely by the ring in the middle; bones get longer."
+    hint = "Drag an arrow: move   Click: pick a joint   Shift: add to the selection   Ctrl: steps of a centimetre"
+    step = "Move joints"
+    craft = "pose"
+    edits = "posing"
+    with_shift = Turn("move", {"add": True})
+    with_ctrl = Turn("move", {"snap": 0.01})
+    Params = MoveParams
+
+    def begin(self, ground: PoseGround, pointer: Pointer) -> Stroke[Posing]:
+        """A move where an arrow is pressed, else the pick of a joint; UserError where there is neither."""
+        joints, selection = joints_of(ground, ground.pose), selected(ground)
+        arrow = arrow_under(ground, joints, selection, self.params, pointer)
+        if arrow is not None:
+            return MoveStroke(ground, selection, joints, arrow, self.params, pointer)
+        return pick(ground, joints, self.params, pointer)
+
+    def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
+        """Joints and bones, and the arrows of the active joint."""
+        joints, selection = joints_of(ground, ground.pose), selected(ground)
+        under = arrow_under(ground, joints, selection, self.params, pointer)
+        return dots(ground, joints, selection) + arrows(ground, joints, selection, self.params, under)
+
+
+class MoveStroke(PosingStroke):
+    """A drag along an arrow, or across the line of sight."""
+
+    def __init__(
+        self, ground: PoseGround, selection: tuple[str, ...], joints: Joints, arrow: int, params: MoveParams,
+        pointer: Pointer,
+    ) -> None:
+        super().__init__(ground, selection)
+        self.joints, self.arrow, self.params = joints, arrow, params
+        self.active = ground.rig.skeleton.names.index(selection[-1])
+        self.centre = joints.world[self.active, :3, 3]
+        self.eye = towards_eye(ground, self.centre)
+        self.axis = None if arrow == FREE else frame_of(joints, self.active, params.axes)[:, arrow]
+        self.start, self.moved = self._place(pointer), np.zeros(3)
+
+    def _place(self, pointer: Pointer) -> Array:
+        """Where (3,) the pointer is on the arrow, or on the plane across the line of sight."""
+        origin, direction = self.ground.ray(pointer)
+        if self.axis is None:
+            return np.asarray(
+                origin + direction * (float((self.centre - origin) @ self.eye) / float(direction @ self.eye)))
+        # the place of the axis nearest to the line of sight through the pointer
+        across = direction - self.axis * float(direction @ self.axis)
+        size = float(across @ across)
+        if size < LEAST**2:
+            return np.asarray(self.centre)
+        ahead = self.axis - direction * float(direction @ self.axis)
+        return np.asarray(self.centre + self.axis * (float((origin - self.centre) @ ahead) / size))
+
+    def posed(self, pointer: Pointer) -> Pose | None:
+        """All selected joints moved by as much as the pointer, in object space."""
+        self.moved = self._place(pointer) - self.start
+        if self.params.snap > 0.0:
+            steps = self.moved if self.axis is None else np.array([self.moved @ self.axis])
+            steps = self.params.snap * np.round(steps / self.params.snap)
+            self.moved = steps if self.axis is None else self.axis * steps[0]
+        skeleton, before = self.ground.rig.skeleton, self.ground.pose
+        translations: dict[str, Vector] = dict(before.translations)
+        for name in self.selection:
+            joint = skeleton.names.index(name)
+            parent = int(skeleton.parents[joint])
+            above = np.eye(3) if parent < 0 else self.joints.world[parent, :3, :3]
+            have = np.array(before.translations.get(name, (0.0, 0.0, 0.0)))
+            x, y, z = map(float, have + np.linalg.solve(above, self.moved))
+            translations[name] = (x, y, z)
+            if max(abs(x), abs(y), abs(z)) <= SAME:
+                del translations[name]
+        moved: Pose = before.replace(translations=translations)
+        return moved
+
+    def overlays(self) -> Overlays:
+        """How far, in words, and the arrows where the joint is now."""
+        now = self.joints._replace(pixels=self.ground.view.pixels(self.joints.world[:, :3, 3] + self.moved)[0])
+        x, y = map(float, now.pixels[self.active])
+        unit = self.ground.unit
+        words = f"{float(np.linalg.norm(self.moved)) / METRES_PER_UNIT[unit]:.4g} {unit}"
+        return (Label(x + self.params.size, y - self.params.size, words),)
+
+
+def arrow_ends(ground: PoseGround, joints: Joints, joint: int, params: ManipulatorParams) -> Array:
+    """Ends (3, 2) of the arrows in pixels."""
+    centre = joints.world[joint, :3, 3]
+    reach = params.size * metres_per_pixel(ground, centre)
+    ends: Array = ground.view.pixels(centre + reach * frame_of(joints, joint, params.axes).T)[0]
+    return ends
+
+
+def arrow_under(
+    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, pointer: Pointer
+) -> int | None:
+    """The arrow of the active joint that a pointer is on: 0, 1, 2, or 3 for the ring in the middle."""
+    if not selection:
+        return None
+    joint = ground.rig.skeleton.names.index(selection[-1])
+    if not joints.seen[joint]:
+        return None
+    place, middle = np.array([pointer.x, pointer.y]), joints.pixels[joint]
+    if np.linalg.norm(place - middle) <= HANDLE:
+        return FREE
+    along = arrow_ends(ground, joints, joint, params) - middle
+    t = np.clip(along @ (place - middle) / np.maximum((along**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(middle + t[:, None] * along - place, axis=1)
+    away[np.linalg.norm(along, axis=1) < LEAST * params.size] = np.inf
+    best = int(np.argmin(away))
+    return best if away[best] <= HANDLE else None
+
+
+def arrows(
+    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, under: int | None
+) -> Overlays:
+    """The arrows of the active joint, the one that is meant thicker."""
+    if not selection:
+        return ()
+    joint = ground.rig.skeleton.names.index(selection[-1])
+    if not joints.seen[joint]:
+        return ()
+    middle = joints.pixels[joint]
+    drawn: list[Polyline | Circle] = []
+    for k, end in enumerate(arrow_ends(ground, joints, joint, params)):
+        along = end - middle
+        side = np.array([-along[1], along[0]])
+        head = np.array([middle, end, end - 0.18 * along + 0.08 * side, end - 0.18 * along - 0.08 * side, end])
+        drawn.append(Polyline(head, "selected" if k == under else AXES[k], 3.0 if k == under else 1.5))
+    free = under == FREE
+    drawn.append(Circle(
+        float(middle[0]), float(middle[1]), HANDLE, "selected" if free else "plain", 3.0 if free else 1.0))
+    return tuple(drawn)

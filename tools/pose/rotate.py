@@ -1,0 +1,195 @@
+"""Rotate: rings about the axes of the active joint; a drag turns all selected joints by the angle seen."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from core.field import field
+from core.overlay import Circle, Label, Overlays, Polyline
+from core.pose.ik import turned_joint
+from core.pose.pose import Pose, local_of_pose, pose_of_local
+from core.transform import Array, matrix_from_quaternion, normalized, quaternion_about
+from tools.pose.craft import PoseGround, Posing
+from tools.pose.posing import (
+    AXES,
+    HANDLE,
+    Joints,
+    ManipulatorParams,
+    PosingStroke,
+    dots,
+    frame_of,
+    joints_of,
+    metres_per_pixel,
+    pick,
+    selected,
+    towards_eye,
+)
+from tools.tool import Pointer, Stroke, Tool, Turn
+
+STEPS = 64  # of a ring that is drawn
+EDGE_ON = 0.17  # cosine between a ring's axis and the line of sight below which the ring is pulled along, not round
+VIEW = 3  # the handle that turns about the line of sight
+VIEW_SIZE = 1.25  # of the other rings
+
+
+class RotateParams(ManipulatorParams):
+    """Settings of Rotate."""
+
+    snap: Annotated[float, field(
+        "Snap", "Turns go in whole steps of this angle; 0 lets them go freely.", "rad", (0, math.pi / 4),
+        (0, math.pi))] = 0.0
+
+
+class Rotate(Tool[RotateParams]):
+    """Turns joints."""
+
+    name = "rotate"
+    label = "Rotate"
+    icon = "rotate"
+    order = 100
+    tooltip = "Turns the selected joints about rings along their axes; click a joint or the skin to pick one."
+    hint = "Drag a ring: turn   Click: pick a joint   Shift: add to the selection   Ctrl: steps of 15 degrees"
+    step = "Rotate joints"
+    craft = "pose"
+    edits = "posing"
+    with_shift = Turn("rotate", {"add": True})
+    with_ctrl = Turn("rotate", {"snap": math.pi / 12})
+    Params = RotateParams
+
+    def begin(self, ground: PoseGround, pointer: Pointer) -> Stroke[Posing]:
+        """A turn where a ring is pressed, else the pick of a joint; UserError where there is neither."""
+        joints, selection = joints_of(ground, ground.pose), selected(ground)
+        ring = ring_under(ground, joints, selection, self.params, pointer)
+        if ring is not None:
+            return RotateStroke(ground, selection, joints, ring, self.params, pointer)
+        return pick(ground, joints, self.params, pointer)
+
+    def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
+        """Joints and bones, and the rings of the active joint, the one under the pointer brighter."""
+        joints, selection = joints_of(ground, ground.pose), selected(ground)
+        under = ring_under(ground, joints, selection, self.params, pointer)
+        return dots(ground, joints, selection) + rings(ground, joints, selection, self.params, under)
+
+
+class RotateStroke(PosingStroke):
+    """A drag round a ring: from the pose at press by the whole angle, so that nothing adds up by rounding."""
+
+    def __init__(
+        self, ground: PoseGround, selection: tuple[str, ...], joints: Joints, ring: int, params: RotateParams,
+        pointer: Pointer,
+    ) -> None:
+        super().__init__(ground, selection)
+        self.joints, self.ring, self.params = joints, ring, params
+        self.active = ground.rig.skeleton.names.index(selection[-1])
+        self.centre = joints.world[self.active, :3, 3]
+        self.eye = towards_eye(ground, self.centre)
+        self.axis = self.eye if ring == VIEW else frame_of(joints, self.active, params.axes)[:, ring]
+        self.edge_on = abs(float(self.axis @ self.eye)) < EDGE_ON
+        self.start, self.angle = pointer, 0.0
+        self.last = 0.0 if self.edge_on else self._around(pointer)
+        self.whole = 0.0
+
+    def _around(self, pointer: Pointer) -> float:
+        """The angle, radians, of the pointer on the plane of the ring, about its axis."""
+        origin, direction = self.ground.ray(pointer)
+        slope = float(direction @ self.axis)
+        if abs(slope) < 1e-9:
+            return self.last
+        place = origin + direction * (float((self.centre - origin) @ self.axis) / slope) - self.centre
+        across = normalized(np.cross(self.axis, np.eye(3)[int(np.argmin(np.abs(self.axis)))]))
+        return math.atan2(float(place @ np.cross(self.axis, across)), float(place @ across))
+
+    def _along(self, pointer: Pointer) -> float:
+        """The same of a ring seen from its edge: how far the pointer pulled along it, over its radius."""
+        tangent = np.cross(self.axis, self.eye)
+        pixels, _ = self.ground.view.pixels(
+            np.array([self.centre, self.centre + tangent * metres_per_pixel(self.ground, self.centre)]))
+        way = normalized(pixels[1] - pixels[0])
+        pulled = np.array([pointer.x - self.start.x, pointer.y - self.start.y])
+        return float(pulled @ way) / self.params.size
+
+    def posed(self, pointer: Pointer) -> Pose | None:
+        """All selected joints turned by the angle from the press, each about its own axis where axes are local."""
+        if self.edge_on:
+            self.whole = self._along(pointer)
+        else:
+            now = self._around(pointer)
+            self.whole += (now - self.last + math.pi) % (2.0 * math.pi) - math.pi
+            self.last = now
+        step = self.params.snap
+        self.angle = self.whole if step == 0.0 else step * round(self.whole / step)
+        skeleton, before = self.ground.rig.skeleton, self.ground.pose
+        local = local_of_pose(skeleton, before)
+        for name in self.selection:
+            joint = skeleton.names.index(name)
+            own = self.ring != VIEW and self.params.axes == "local"
+            axis = frame_of(self.joints, joint, "local")[:, self.ring] if own else self.axis
+            local[joint] = turned_joint(
+                skeleton, local_of_pose(skeleton, before), joint,
+                matrix_from_quaternion(quaternion_about(axis, self.angle)))[joint]
+        return pose_of_local(skeleton, local, before.name, dict(before.numbers))
+
+    def overlays(self) -> Overlays:
+        """The angle in words, beside the joint, and the ring that is held."""
+        x, y = map(float, self.joints.pixels[self.active])
+        reach = self.params.size * (VIEW_SIZE if self.ring == VIEW else 1.0)
+        return (*rings(self.ground, self.joints, self.selection, self.params, self.ring),
+                Label(x + reach, y - reach, f"{math.degrees(self.angle):.1f}\N{DEGREE SIGN}"))
+
+
+def ring_points(ground: PoseGround, joints: Joints, joint: int, params: ManipulatorParams) -> list[Array]:
+    """The three rings (64, 2) of a joint in pixels."""
+    centre = joints.world[joint, :3, 3]
+    radius = params.size * metres_per_pixel(ground, centre)
+    turn = np.linspace(0.0, 2.0 * np.pi, STEPS, endpoint=False)
+    frame = frame_of(joints, joint, params.axes)
+    found = []
+    for k in range(3):
+        u, v = frame[:, (k + 1) % 3], frame[:, (k + 2) % 3]
+        places = centre + radius * (np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v)
+        found.append(ground.view.pixels(places)[0])
+    return found
+
+
+def ring_under(
+    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, pointer: Pointer
+) -> int | None:
+    """The ring of the active joint that a pointer is on: 0, 1, 2, or 3 for the one about the line of sight."""
+    if not selection:
+        return None
+    joint = ground.rig.skeleton.names.index(selection[-1])
+    if not joints.seen[joint]:
+        return None
+    place = np.array([pointer.x, pointer.y])
+    away = [_distance(place, points) for points in ring_points(ground, joints, joint, params)]
+    away.append(abs(float(np.linalg.norm(place - joints.pixels[joint])) - VIEW_SIZE * params.size))
+    best = int(np.argmin(away))
+    return best if away[best] <= HANDLE else None
+
+
+def _distance(place: Array, points: Array) -> float:
+    """Pixels from a place (2,) to a closed line (N, 2)."""
+    along = np.roll(points, -1, axis=0) - points
+    t = np.clip(((place - points) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    return float(np.linalg.norm(points + t[:, None] * along - place, axis=1).min())
+
+
+def rings(
+    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, under: int | None
+) -> Overlays:
+    """The rings of the active joint, the one that is meant thicker."""
+    if not selection:
+        return ()
+    joint = ground.rig.skeleton.names.index(selection[-1])
+    if not joints.seen[joint]:
+        return ()
+    x, y = map(float, joints.pixels[joint])
+    drawn = [
+        Polyline(points, "selected" if k == under else AXES[k], 3.0 if k == under else 1.5, closed=True)
+        for k, points in enumerate(ring_points(ground, joints, joint, params))
+    ]
+    chosen = under == VIEW
+    return (*drawn, Circle(x, y, VIEW_SIZE * params.size, "selected" if chosen else "plain", 3.0 if chosen else 1.0))
