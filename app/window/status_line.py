@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QFontMetrics, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from app.window.desk import Desk
@@ -16,7 +16,33 @@ from core.workspace import Workspace
 SAID_MS = 6000  # how long something said stays, before the hint comes back
 FAILED_MS = 20000
 ACTIONS = (("orbit", "turn"), ("pan", "slide"), ("dolly", "nearer"))
+GAP = "   "  # between two hints
 WORDS = {"LMB": "Left button", "MMB": "Middle button", "RMB": "Right button", "Wheel": "Wheel"}
+
+
+class HintLabel(QLabel):
+    """A line of hints that shows as many whole ones as fit; the tooltip has all of them."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._whole = ""
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def show_words(self, words: str) -> None:
+        """Show a sentence, or hints with :data:`GAP` between them."""
+        self._whole = words
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        shown = fitting(self._whole, self.fontMetrics(), self.width())
+        if shown != self.text():
+            self.setText(shown)
+        self.setToolTip("" if shown == self._whole else self._whole)
 
 
 class StatusLine(QWidget):
@@ -25,9 +51,7 @@ class StatusLine(QWidget):
     def __init__(self, desk: Desk, hotkeys: Hotkeys, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk, self._hotkeys = desk, hotkeys
-        self.words = QLabel()
-        self.words.setTextFormat(Qt.TextFormat.PlainText)
-        self.words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.words = HintLabel()
         self.copy = QPushButton("Copy details")
         self.copy.setToolTip("Copies the whole message, to send it to whoever looks after the program.")
         self.copy.clicked.connect(self._copy)
@@ -73,12 +97,12 @@ class StatusLine(QWidget):
         self._failed = False
         self.copy.hide()
         self._paint("text" if self._doing else "dim")
-        self.words.setText(self._doing or hint(self._desk, self._hotkeys.keymap))
+        self.words.show_words(self._doing or hint(self._desk, self._hotkeys.keymap))
 
     def _show(self, sentence: str, colour: str, milliseconds: int) -> None:
         self.copy.hide()
         self._paint(colour)
-        self.words.setText(sentence)
+        self.words.show_words(sentence)
         self._until.start(milliseconds)
 
     def _paint(self, colour: str) -> None:
@@ -111,7 +135,18 @@ def hint(desk: Desk, keymap: Keymap) -> str:
               if (keys := keymap.navigate.get(action))]  # type: ignore[call-overload]
     if radial := keymap.brush.get("radial"):
         parts.append(f"{_written(radial)}: menu")
-    return "   ".join(parts)
+    return GAP.join(parts)
+
+
+def fitting(words: str, metrics: QFontMetrics, width: int) -> str:
+    """As many whole hints, else as many whole words, as `width` pixels hold; "…" stands for the rest."""
+    for gap in (GAP, " "):
+        parts = words.split(gap)
+        for count in range(len(parts), 0, -1):
+            shown = gap.join(parts[:count]) + ("" if count == len(parts) else f"{gap}…")
+            if metrics.horizontalAdvance(shown) <= width:
+                return shown
+    return metrics.elidedText(words, Qt.TextElideMode.ElideRight, width)
 
 
 def _written(keys: tuple[str, ...]) -> str:

@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
+from app.window.status_line import hint
 from core.document import Document
 from core.errors import UserError
 from tests.window.conftest import Opened
@@ -41,6 +42,24 @@ def test_during_strokes_moves_of_the_camera_and_the_brush(hand: Hand) -> None:
     hand.press(BACK, RIGHT)
     assert words(hand) == idle
     hand.release(BACK, RIGHT)
+
+
+def test_a_narrow_line_shows_whole_hints_and_the_rest_in_its_tooltip(hand: Hand) -> None:
+    whole = hint(hand.window.desk, hand.window.hotkeys.keymap)
+    label = hand.window.status.words
+    seen = set()
+    for wide in range(900, 500, -25):
+        hand.window.resize(wide, 640)
+        hand.until(lambda: hand.window.width() <= 900)
+        hand.painted()
+        label.resize(wide - 420, label.height())  # narrower than any window may be
+        shown = words(hand)
+        seen.add(shown)
+        parts = shown.removesuffix("…").rstrip().split("   ")
+        assert parts == whole.split("   ")[:len(parts)]
+        assert label.fontMetrics().horizontalAdvance(shown) <= label.width()
+        assert label.toolTip() == ("" if shown == whole else whole)
+    assert len(seen) > 2
 
 
 def test_what_went_wrong_stays_while_the_hand_goes_on(hand: Hand) -> None:
