@@ -49,11 +49,11 @@ def scale_length(guides: Guides, factor: float, weights: Weights = None, minimum
 
 
 def cut_at_line(
-    guides: Guides, view: View, line: ArrayLike, mask: NDArray[np.bool_] | None = None, minimum: float = MINIMUM
+    guides: Guides, view: View, line: ArrayLike, mask: NDArray[np.bool_] | None = None, minimum: ArrayLike = MINIMUM
 ) -> Guides:
     """Strands lose what lies beyond the place where they first cross a line (K, 2) drawn in pixels.
 
-    mask : (G,) bool, strands that may be cut, e.g. `facing`.
+    mask : (G,) bool, strands that may be cut, e.g. `facing`. minimum : metres that stay, a number or (G,).
     """
     path = np.ascontiguousarray(np.asarray(line, np.float64).reshape(-1, 2))
     return _cut(guides, _first_crossings(guides.points, *_screen(guides, view), path), mask, minimum)
@@ -61,9 +61,12 @@ def cut_at_line(
 
 def cut_with_ring(
     guides: Guides, view: View, path: ArrayLike, radius: float, mask: NDArray[np.bool_] | None = None,
-    minimum: float = MINIMUM,
+    minimum: ArrayLike = MINIMUM,
 ) -> Guides:
-    """Strands lose what lies beyond the place where they first enter a ring of `radius` pixels dragged along a path."""
+    """Strands lose what lies beyond the place where they first enter a ring of `radius` pixels dragged along a path.
+
+    minimum : metres that stay where the ring goes over the root, a number or (G,).
+    """
     way = np.ascontiguousarray(np.asarray(path, np.float64).reshape(-1, 2))
     return _cut(guides, _first_entries(guides.points, *_screen(guides, view), way, float(radius)), mask, minimum)
 
@@ -82,13 +85,14 @@ def _to_lengths(guides: Guides, wanted: NDArray[np.float64], weights: Weights, m
     return with_points(guides, rows, stretched(guides.points[rows], target[rows]))
 
 
-def _cut(guides: Guides, at: NDArray[np.float64], mask: NDArray[np.bool_] | None, minimum: float) -> Guides:
+def _cut(guides: Guides, at: NDArray[np.float64], mask: NDArray[np.bool_] | None, minimum: ArrayLike) -> Guides:
     now = arc_lengths(guides.points)[:, -1]
     may = editable(guides) & (strand_freedom(guides.hold) > 0.5)  # half held is held: scissors do not cut by halves
     if mask is not None:
         may &= mask
     rows = np.flatnonzero(may & np.isfinite(at) & (at < now))
-    keep = np.maximum(at[rows], np.minimum(minimum, now[rows]))
+    least = np.broadcast_to(np.asarray(minimum, np.float64), (len(guides),))
+    keep = np.maximum(at[rows], np.minimum(least, now)[rows])
     points = guides.points[rows]
     return with_points(guides, rows, sample_at(points, arc_fractions(points) * keep[:, None]))
 

@@ -162,7 +162,7 @@ def test_length_grows_shrinks_and_sets():
 def test_the_ring_cuts_where_it_touches_and_the_line_where_it_crosses():
     s = session()
     before = guides_of(s)
-    after = stroke(s, "cut", line((100, 150), (300, 150)), size=6.0)
+    after = stroke(s, "cut", line((100, 150), (300, 150)), size=6.0, stub=0.0)
     cut = (before.points != after.points).any(axis=(1, 2))
     assert cut.any()
     assert (lengths(after.points)[cut] < lengths(before.points)[cut]).all()
@@ -180,6 +180,20 @@ def test_the_ring_cuts_where_it_touches_and_the_line_where_it_crosses():
     assert cut.any()
     # a tip at the root is one that was cut off whole
     np.testing.assert_allclose(pixels(after.points[cut][:, -1])[:, 1], 150.0, atol=0.2)
+
+
+@pytest.mark.parametrize("how", ["ring", "line"])
+def test_scissors_over_the_roots_leave_a_stub_of_every_hair(how):
+    s = session()
+    before = guides_of(s)
+    to_and_fro = line((100, 150), (300, 150)) + line((300, 150), (100, 150))
+    after = stroke(s, "cut", to_and_fro, size=30.0, stub=0.6, how=how)
+    part = lengths(after.points) / lengths(before.points)
+    assert part.min() == pytest.approx(0.6, rel=1e-3), "however often the hand goes over them"
+    assert (part <= 1.0 + 1e-6).all()
+    s.undo()
+    shaved = stroke(s, "cut", to_and_fro, size=30.0, stub=0.0, how=how)
+    assert (lengths(shaved.points) / lengths(before.points)).min() < 0.4
 
 
 def test_hairspray_holds_and_wash_frees():

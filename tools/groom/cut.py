@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.field import field
 from core.groom.guides import Guides
-from core.groom.length import cut_at_line, cut_with_ring
+from core.groom.length import cut_at_line, cut_with_ring, lengths
 from core.groom.region import editable
 from core.overlay import Overlays, Polyline
 from tools.brush import BrushStroke, on_rows
@@ -27,6 +28,9 @@ class CutParams(ReachParams):
     how: Annotated[Literal["ring", "line"], field(
         "Cuts with", "The ring cuts hair where it first touches it; a line cuts at release, where it crosses.",
         choices=("ring", "line"))] = "ring"
+    stub: Annotated[float, field(
+        "Stub", "The share of its length a hair keeps, however near its root the cut goes; 0 shaves.",
+        soft=(0.0, 1.0), hard=(0.0, 1.0))] = 0.25
 
 
 class Cut(Tool[CutParams]):
@@ -53,6 +57,11 @@ class Cut(Tool[CutParams]):
         return ring_overlays(self.params, ground, pointer) if self.params.how == "ring" else ()
 
 
+def stubs_of(ground: GroomGround, params: CutParams) -> NDArray[np.float64]:
+    """Metres (G,) that stay of each guide, by its length at press: going over it again in a stroke cuts no more."""
+    return np.maximum(params.stub * lengths(ground.guides.points), SHORTEST * ground.rest.diagonal)
+
+
 class RingCut(BrushStroke[CutParams]):
     """Cuts while it goes."""
 
@@ -61,8 +70,8 @@ class RingCut(BrushStroke[CutParams]):
         self.screen.follow(guides)
         rows = self.screen.near(self.way, self.radius, self.params.through)
         rows = rows[editable(guides)[rows]]
-        view, shortest = self.ground.view, SHORTEST * self.ground.rest.diagonal
-        return on_rows(guides, rows, lambda g: cut_with_ring(g, view, self.way, self.radius, None, shortest))
+        view, stubs = self.ground.view, stubs_of(self.ground, self.params)[rows]
+        return on_rows(guides, rows, lambda g: cut_with_ring(g, view, self.way, self.radius, None, stubs))
 
 
 class LineCut(BrushStroke[CutParams]):
@@ -83,8 +92,8 @@ class LineCut(BrushStroke[CutParams]):
         line = np.array(self.line)
         rows = self.screen.near(line, 1.0, self.params.through)
         rows = rows[editable(guides)[rows]]
-        view, shortest = self.ground.view, SHORTEST * self.ground.rest.diagonal
-        return on_rows(guides, rows, lambda g: cut_at_line(g, view, line, None, shortest))
+        view, stubs = self.ground.view, stubs_of(self.ground, self.params)[rows]
+        return on_rows(guides, rows, lambda g: cut_at_line(g, view, line, None, stubs))
 
     def overlays(self) -> Overlays:
         """The line so far."""
