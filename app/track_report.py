@@ -19,11 +19,15 @@ from core.match.track import Track, TrackSettings
 MOST_TRACKS = 200
 WIDE, HIGH = 260, 48
 STYLE = """
-body{font:14px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:1180px;padding:0 1rem;color:#1c1d20;background:#fff}
+body{font:14px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:1180px;
+padding:0 1rem;color:#1c1d20;background:#fff}
 h1{font-size:1.4rem;margin:0 0 .2rem} .sub{color:#666;margin:0 0 1rem} table{border-collapse:collapse;width:100%}
-th{font-weight:600;text-align:left;color:#555} td,th{padding:.35rem .6rem;border-bottom:1px solid #e6e6e8;vertical-align:middle}
-td.n{text-align:right;font-variant-numeric:tabular-nums} img.p{width:63px;height:63px;image-rendering:pixelated;display:block}
-.pics{display:flex;gap:4px} svg{display:block} .note{background:#fff6e0;padding:.4rem .7rem;border-radius:4px;margin:.2rem 0}
+th{font-weight:600;text-align:left;color:#555} td,th{padding:.35rem .6rem;
+border-bottom:1px solid #e6e6e8;vertical-align:middle}
+td.n{text-align:right;font-variant-numeric:tabular-nums}
+img.p{width:63px;height:63px;image-rendering:pixelated;display:block}
+.pics{display:flex;gap:4px} svg{display:block}
+.note{background:#fff6e0;padding:.4rem .7rem;border-radius:4px;margin:.2rem 0}
 img.f{width:100%;height:auto;border-radius:4px}
 @media(prefers-color-scheme:dark){body{background:#1b1c1f;color:#e4e4e6}td,th{border-color:#33343a}th,.sub{color:#a0a0a6}
 .note{background:#3a3220}}
@@ -49,10 +53,12 @@ def write_report(
 <title>{escape(plate.name)}: tracks</title><style>{STYLE}</style>
 <h1>{escape(plate.name)}</h1>
 <p class=sub>{len(tracks)} tracks, {sum(len(t.frames) for t in tracks):,} points, {lost} end before the plate does;
-frames {plate.first} to {plate.last}, {plate.width} x {plate.height} pixels; pattern {settings.pattern}, model {escape(settings.model)}</p>
+frames {plate.first} to {plate.last}, {plate.width} x {plate.height} pixels;
+pattern {settings.pattern}, model {escape(settings.model)}</p>
 {"".join(f"<p class=note>{escape(words)}</p>" for words in warnings[:50])}
 {_overview(tracks, middle, read)}
-<p class=sub>Frame {middle} with the tails of 10 frames. Green is sure, red is not: a standard deviation of 0.5 px and more.</p>
+<p class=sub>Frame {middle} with the tails of 10 frames. Green is sure, red is not:
+a standard deviation of 0.5 px and more.</p>
 <table><tr><th>track<th>frames<th>worst<th>pattern at key and end<th>motion x, y<th>standard deviation, px<th>score</tr>
 {rows}</table>{more}</html>"""
     path.write_text(page, encoding="utf-8")
@@ -78,7 +84,8 @@ def _row(track: Track, span: range, patterns: dict[tuple[int, int], str]) -> str
         f"<tr><td>{escape(track.name)}<td class=n>{track.frames[0]}&ndash;{track.frames[-1]}"
         f"<td class=n>{deviation[k]:.3f} px<br>frame {track.frames[k]}<td><div class=pics>{pictures}</div>"
         f"<td>{_curves(track, span, (moved[:, 0], moved[:, 1]), ('#d04a3a', '#3a8a4a'))}"
-        f"<td>{_curves(track, span, (deviation,), ('#3a6fd0',), 0.0)}<td>{_curves(track, span, (track.score,), ('#8a5ad0',), 0.0, 1.0)}"
+        f"<td>{_curves(track, span, (deviation,), ('#3a6fd0',), 0.0)}"
+        f"<td>{_curves(track, span, (track.score,), ('#8a5ad0',), 0.0, 1.0)}"
     )
 
 
@@ -102,7 +109,8 @@ def _curves(
             words.append(f"{'L' if before == frame - 1 else 'M'}{x:.1f} {HIGH - 3 - (value - low) * scale:.1f}")
             before = frame
         parts.append(f'<path d="{"".join(words)}" fill=none stroke="{colour}" stroke-width=1.3 stroke-linecap=round />')
-    text = f"<text x=2 y=9 font-size=9 fill=#888>{high:.3g}</text><text x=2 y={HIGH - 1} font-size=9 fill=#888>{low:.3g}</text>"
+    ends = ((9, high), (HIGH - 1, low))
+    text = "".join(f"<text x=2 y={y} font-size=9 fill=#888>{value:.3g}</text>" for y, value in ends)
     return f'<svg width={WIDE} height={HIGH} viewBox="0 0 {WIDE} {HIGH}" role=img>{"".join(parts)}{text}</svg>'
 
 

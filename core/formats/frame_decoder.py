@@ -80,7 +80,9 @@ class FrameDecoder:
     def _ask(
         self, request: FrameRequest, name: str, cancel: Callable[[], bool] | None
     ) -> tuple[FrameAnswer, NDArray[Any]]:
-        if self._child is None or self._child.poll() is not None:
+        if self._child is not None and self._child.poll() is not None:
+            self._end()
+        if self._child is None:
             self._child = subprocess.Popen(  # our own interpreter and fixed words
                 [sys.executable, "-I", "-c", BOOT, str(self._memory), *child_paths()],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE,

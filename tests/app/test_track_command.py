@@ -1,0 +1,89 @@
+"""``filoplume track`` and ``filoplume flow`` as a script calls them."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from core.formats.flow_file import read_flo
+from tests.app import test_cli
+from tests.core.match.plates import frame, place
+
+POINT = np.array([70.0, 62.0])
+
+
+def filoplume(*arguments):
+    """Exit code, standard output and standard error."""
+    done = test_cli.filoplume(*arguments)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory):
+    """Frames 1001 to 1008, without 1005, and 1006 broken."""
+    path = tmp_path_factory.mktemp("plate")
+    for k in range(8):
+        cv2.imwrite(str(path / f"shot.{1001 + k}.png"), np.round(frame(k)[:, :, ::-1]).clip(0, 255).astype(np.uint8))
+    (path / "shot.1005.png").unlink()
+    (path / "shot.1006.png").write_bytes(b"\x89PNG\r\n\x1a\n broken")
+    return path
+
+
+def test_keys_are_followed_in_the_numbers_of_the_files(plate, tmp_path):
+    keys, out, page = tmp_path / "in.json", tmp_path / "out.json", tmp_path / "page.html"
+    keys.write_text(
+        json.dumps(
+            {"size": [160, 120], "frames": [1001, 1008], "tracks": [{"name": "eye", "points": [[1001, *POINT]]}]}
+        )
+    )
+    code, words, _ = filoplume("track", plate, "--tracks", keys, "--tracks-out", out, "--report", page, "--json")
+    assert code == 0
+    result = json.loads(words)
+    assert {"frames", "tracks", "observations", "seconds", "ms_per_track_frame", "warnings"} <= result.keys()
+    assert (result["frames"], result["tracks"], result["observations"]) == ([1001, 1008], 1, 6)
+    assert any("1005" in w for w in result["warnings"])
+    assert any("1006" in w for w in result["warnings"])
+    made = json.loads(out.read_text())
+    assert (made["size"], made["frames"]) == ([160, 120], [1001, 1008])
+    (track,) = made["tracks"]
+    assert track["name"] == "eye"
+    assert [p[0] for p in track["points"]] == [1001, 1002, 1003, 1004, 1007, 1008]
+    for number, x, y, sxx, sxy, syy, score in track["points"]:
+        assert np.linalg.norm([x, y] - place(POINT, number - 1001)) < 0.15
+        assert sxx > 0
+        assert sxx * syy > sxy**2
+        assert 0 <= score <= 1
+    text = page.read_text()
+    assert "eye" in text
+    assert 'src="http' not in text
+
+
+def test_features_are_found_by_themselves(plate):
+    code, words, _ = filoplume("track", plate, "--auto", "10", "--json")
+    assert code == 0
+    assert json.loads(words)["tracks"] >= 8
+
+
+def test_what_cannot_be_done_is_said(plate, tmp_path):
+    keys = tmp_path / "in.json"
+    keys.write_text(json.dumps({"size": [100, 100], "tracks": [{"name": "a", "points": [[1, 2, 3]]}]}))
+    for arguments in (
+        (plate, "--tracks", keys),
+        (tmp_path / "none", "--auto", "3"),
+        (plate, "--auto", "3", "--tracks-out", tmp_path / "a.doc"),
+    ):
+        code, words, error = filoplume("track", *arguments, "--json")
+        assert code == 1
+        assert "error" in json.loads(words)
+        assert len(error.strip().splitlines()) == 1
+
+
+def test_flow_goes_into_a_file(plate, tmp_path):
+    out = tmp_path / "a.flo"
+    code, words, _ = filoplume("flow", plate / "shot.1001.png", plate / "shot.1002.png", "-o", out, "--json")
+    assert code == 0
+    flow = read_flo(out)
+    truth = place(POINT, 1) - POINT
+    np.testing.assert_allclose(flow[62, 70], truth, atol=0.15)
+    assert json.loads(words)["size"] == [160, 120]
