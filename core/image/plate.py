@@ -46,7 +46,7 @@ class ChannelMix(Record):
         field(
             "Denoise",
             "Standard deviation of the Gauss that takes out grain before looking.",
-            "pixels",
+            "px",
             soft=(0.0, 3.0),
             hard=(0.0, 10.0),
             step=0.1,
@@ -57,7 +57,7 @@ class ChannelMix(Record):
         field(
             "Local contrast",
             "Side of the neighbourhood whose mean and spread are evened out, for dark plates; 0 leaves them.",
-            "pixels",
+            "px",
             soft=(0.0, 200.0),
             hard=(0.0, 2000.0),
             step=1.0,

@@ -21,7 +21,7 @@ class TrackSettings(Record):
         field(
             "Pattern",
             "Side of the square that is followed; larger is steadier, smaller bends less with the surface.",
-            "pixels",
+            "px",
             soft=(9, 61),
             hard=(7, 201),
             step=2,
@@ -32,7 +32,7 @@ class TrackSettings(Record):
         field(
             "Search",
             "How far from the place foretold the pattern is looked for when it is not found at once.",
-            "pixels",
+            "px",
             soft=(5, 100),
             hard=(2, 500),
             step=1,
