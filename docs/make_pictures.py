@@ -12,6 +12,8 @@ import numpy as np
 from app.commands.demo import draw_poses
 from app.deliver import draw
 from app.files import draw_file
+from core.demo.arm import arm
+from core.demo.arm_sculpts import arm_sculpts
 from core.demo.document import demo_document
 from core.demo.pose_document import pose_document
 from core.document import Document, MeshObject
@@ -22,6 +24,7 @@ from core.groom.dress import dress
 from core.groom.grow import grow
 from core.groom.style import load_style
 from core.mesh.skin import skin_posed
+from core.pose.ablation import METHODS, predicted
 from core.pose.pose import REST
 from core.pose.synthesis import evaluate
 from tests.display import ensure_display
@@ -64,6 +67,7 @@ def main() -> None:
     draw_file(turned, PICTURES / "demo-1024.png", (1200, 750), "three-quarter", 1024, print)
     turned.unlink()
     pose_pictures(evaluator)
+    ablation_picture(evaluator)
     data = os.environ.get("FILOPLUME_DATA")
     if not data:
         print("FILOPLUME_DATA is not set: the pictures of the cat stay as they are")
@@ -105,6 +109,29 @@ def pose_pictures(evaluator: Evaluator) -> None:
         rows.append(np.hstack(row))
     cv2.imwrite(str(PICTURES / "arm-poses.png"), np.vstack(rows[:2]))
     cv2.imwrite(str(PICTURES / "face-poses.png"), rows[2])
+
+
+def ablation_picture(evaluator: Evaluator) -> None:
+    """Elbow, forearm and shoulder at a pose nobody sculpted, by every method, from the sculpts on both sides of it."""
+    model = arm()
+    known = [sculpt for share in (0.5, 1.0) for sculpt in arm_sculpts(model, share)]
+    rows = []
+    for held in arm_sculpts(model, 0.75):
+        row = []
+        for method in (None, *METHODS):
+            points = held.target if method is None else predicted(
+                model.mesh.points, model.rig, known, held.pose, method)
+            path = PICTURES / "one.png"
+            item = MeshObject(id=1, name="arm", mesh=model.mesh, rig=model.rig)
+            skin = skin_posed(model.mesh, np.asarray(points, np.float32), evaluator)
+            draw_poses(path, Document(meshes=(item,)), {1: skin}, (300, 240))
+            image = cv2.imread(str(path))
+            path.unlink()
+            words = "sculpted" if method is None else method
+            cv2.putText(image, words, (10, 22), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (230, 230, 230), 1, cv2.LINE_AA)
+            row.append(image)
+        rows.append(np.hstack(row))
+    cv2.imwrite(str(PICTURES / "ablation.jpg"), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 if __name__ == "__main__":

@@ -46,17 +46,23 @@ STROKES: dict[str, tuple[str, tuple[float, float, float], tuple[Dab, ...]]] = {
 }
 
 
-def arm_sculpts(model: Arm) -> tuple[Sculpt, ...]:
-    """The sculpts: dual quaternion skinning, which keeps the volume, worked over with brushes."""
+def arm_sculpts(model: Arm, share: float = 1.0) -> tuple[Sculpt, ...]:
+    """The sculpts: dual quaternion skinning, which keeps the volume, worked over with brushes.
+
+    Parameters
+    ----------
+    share : of the angle and of every dab, 0 .. 1: sculpts on the way to the whole ones, to compare methods by.
+    """
     surface = sculpt_surface(model.mesh)
     kept = model.rig.replace(skinning="dual-quaternion")
     out = []
     for name, (joint, degrees, dabs) in STROKES.items():
-        x, y, z, w = map(float, quaternion_from_euler(degrees))
-        pose = Pose(name=name, rotations={joint: (x, y, z, w)})
+        x, y, z, w = map(float, quaternion_from_euler(share * np.array(degrees)))
+        named = name if share == 1.0 else f"{name} to {share:.0%}"
+        pose = Pose(name=named, rotations={joint: (x, y, z, w)})
         points = deformed(model.mesh.points, kept, local_of_pose(model.rig.skeleton, pose))
         for dab in dabs:
-            points = _dabbed(surface, model.mesh.points, points, dab)
+            points = _dabbed(surface, model.mesh.points, points, (*dab[:3], share * dab[3]))
         out.append(Sculpt(pose, points))
     return tuple(out)
 

@@ -61,8 +61,8 @@ def predicted(
 ) -> NDArray[np.float32]:
     """The surface (V, 3) at `pose` by one method, from some sculpts.
 
-    SSD : the skin alone. SI : the sculpted surfaces themselves mixed by sliders, without a skeleton; the sliders follow
-    the pose in straight lines and are held to a sum of 1. Euler PSD : distance between Euler angles. PSD : as the
+    SSD : the skin alone. SI : the sculpted surfaces themselves mixed by sliders, without a skeleton; the sliders go in
+    straight lines from each sculpt to the next. Euler PSD : distance between Euler angles. PSD : as the
     rest of the program does. WPSD : distances weighted by skin, Kurihara and Miyata (2004).
     """
     if method == "SSD" or not sculpts:
@@ -76,8 +76,7 @@ def predicted(
     vertices = np.arange(len(points), dtype=np.int32)
     layer, _ = extract_layer(points, rig, [], "all", space, vertices, targets)
     if method == "SI":
-        shares = plain_weights(layer.replace(kind="linear"), pose)
-        shares = shares / max(1.0, float(shares.sum()))
+        shares = plain_weights(layer.replace(kind="interpolation"), pose)
         return (points + np.einsum("m,mvd->vd", shares, targets - points)).astype(np.float32)
     if method == "Euler PSD":
         layer = _fixed(layer, _euler_weights(read, sculpts, pose), pose)
