@@ -6,6 +6,7 @@ other sculpt stays what it was, whatever layer it lies in.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -17,12 +18,13 @@ from core.document import Document, MeshObject, find_mesh, with_mesh
 from core.errors import UserError
 from core.formats.pose_json import read_sculpt
 from core.pose import edit_layers
+from core.pose.clip import onto_skeleton, resampled
 from core.pose.controls import rotation_dof
 from core.pose.corrective import as_kind
 from core.pose.layers import space_dofs
 from core.pose.pose import SAME, Pose
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, Way
-from core.pose.rig import Rig
+from core.pose.rig import Rig, all_clips
 from core.pose.synthesis import evaluate
 
 NOTHING = Correctives()
@@ -151,6 +153,62 @@ def set_way(document: Document, mesh_id: int, way: Way) -> Document:
     """The document with all layers interpolated in another way: the pose space, or plain shapes to compare with."""
     item, _ = _rigged(document, mesh_id)
     return with_mesh(document, item.replace(correctives=as_kind(_correctives(document, mesh_id), way)))
+
+
+def hold_pose(document: Document, mesh_id: int, pose: Pose | None) -> Document:
+    """The document with a mesh held in a pose; None for the clip at the frame again."""
+    item, _ = _rigged(document, mesh_id)
+    return with_mesh(document, item.replace(pose=pose))
+
+
+def select_joints(document: Document, mesh_id: int, names: Sequence[str]) -> Document:
+    """The document with joints of a mesh selected, the active one last; UserError when there is no such joint."""
+    item, rig = _rigged(document, mesh_id)
+    for name in names:
+        if name not in rig.skeleton.names:
+            raise UserError(f"There is no joint {name!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")
+    return with_mesh(document, item.replace(joint_selection=tuple(dict.fromkeys(names))))
+
+
+def keep_pose(document: Document, mesh_id: int, pose: Pose) -> Document:
+    """The document with a pose in the library; it takes the place of the one of its name."""
+    item, _ = _rigged(document, mesh_id)
+    others = tuple(known for known in item.library if known.name != pose.name)
+    return with_mesh(document, item.replace(library=(*others, pose)))
+
+
+def forget_pose(document: Document, mesh_id: int, name: str) -> Document:
+    """The document without a pose of the library; UserError when there is none of that name."""
+    item, _ = _rigged(document, mesh_id)
+    others = tuple(known for known in item.library if known.name != name)
+    if len(others) == len(item.library):
+        raise UserError(f"The library has no pose {name!r}; choose one from its list.")
+    return with_mesh(document, item.replace(library=others))
+
+
+def add_rig(document: Document, item: MeshObject) -> Document:
+    """The document with a mesh and its rig, under an id of its own; its clip sets the times of an empty document."""
+    added = item.replace(id=1 + max((known.id for known in document.meshes), default=0))
+    times: dict[str, Any] = {}
+    if not document.meshes and item.rig is not None and item.rig.clip is not None:
+        clip = item.rig.clip
+        times = {"first_frame": math.floor(clip.start), "last_frame": math.ceil(clip.end),
+                 "fps": clip.frames_per_second}
+    changed: Document = document.replace(meshes=(*document.meshes, added), **times)
+    return changed
+
+
+def play_clip_file(document: Document, mesh_id: int, source: Rig) -> Document:
+    """The document with a mesh playing the clip of another rig with joints of the same names, in no pose held."""
+    item, rig = _rigged(document, mesh_id)
+    if source.clip is None:
+        raise UserError("That file has no motion; choose one with a clip.")
+    clip = onto_skeleton(source.clip, source.skeleton, rig.skeleton)
+    clip = resampled(clip, document.fps, float(document.first_frame))
+    played = rig.replace(clip=clip, clips=all_clips(rig))
+    last = max(document.last_frame, math.ceil(clip.end))
+    changed: Document = with_mesh(document, item.replace(rig=played, pose=None)).replace(last_frame=last)
+    return changed
 
 
 # what these share

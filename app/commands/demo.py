@@ -20,6 +20,7 @@ from core.evaluator import Evaluator
 from core.formats.project import write_project
 from core.groom.grow import grow
 from core.mesh.skin import Skin
+from core.workspace import Workspace
 
 POSE_FRAMES = (1001, 1017, 1045, 1065)
 
@@ -72,7 +73,7 @@ def _pose(folder: Path, as_json: bool) -> None:
     with report.working(total=6):
         document = pose_document(stage=report.stage)
         with report.stage("export_filo", f"writing {project}"):
-            write_project(project, document)
+            write_project(project, document, Workspace(craft="pose", tool="grab"))
         for path, frame in pictures:
             with report.stage("export_picture", f"drawing {path.name}"):
                 draw_poses(path, document, posed_document(document, frame, evaluator))

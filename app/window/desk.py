@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from app.window.jobs import Jobs
-from core.document import Document
+from core.document import Document, MeshObject
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.workspace import Workspace
@@ -64,6 +64,18 @@ class Desk(QObject):
         wanted = self.workspace.groom
         found = next((groom for groom in grooms if groom.id == wanted), None)
         return found if found is not None or wanted is not None else (grooms[0] if grooms else None)
+
+    @property
+    def posed(self) -> MeshObject | None:
+        """The mesh that the pose craft works on, as it is shown, or None."""
+        rigged = [item for item in self.document.meshes if item.rig is not None]
+        return next((item for item in rigged if item.id == self.workspace.mesh), rigged[0] if rigged else None)
+
+    def set_craft(self, name: str) -> None:
+        """Make a craft the active one, with its tools and panels."""
+        old = self.session.workspace
+        if self.attempt(self.session.set_craft, name) is not FAILED and self.session.workspace is not old:
+            self.workspace_changed.emit(old, self.session.workspace)
 
     def set_workspace(self, **changes: Any) -> None:
         """Replace fields of the workspace; panels hear of it when anything is another value."""

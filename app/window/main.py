@@ -39,6 +39,9 @@ from app.window.palette import Palette
 from app.window.pictures_dialog import PicturesDialog
 from app.window.playblast import PlayblastDialog
 from app.window.plugin_bar import PluginBar
+from app.window.pose_controls import PoseControls
+from app.window.pose_list import PoseLibrary, PoseList
+from app.window.pose_side import BesideView, PoseSide
 from app.window.preferences import Preferences
 from app.window.recovery_bar import RecoveryBar
 from app.window.screenshot import Photographer
@@ -51,7 +54,7 @@ from app.window.timeline import Timeline
 from app.window.top_bar import TopBar
 from app.window.view_host import ViewHost
 from app.window.viewport_widget import Viewport
-from app.window.window_commands import PANELS
+from app.window.window_commands import PANEL_CRAFTS, PANELS
 from core.camera import Camera
 from core.document import Document
 from core.errors import UserError
@@ -60,6 +63,7 @@ from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
+AROUND = ("shelf", "timeline", "pose_map")  # panels that are not in the column
 COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
 
 
@@ -95,7 +99,9 @@ class MainWindow(QMainWindow):
         self.plugins = PluginBar(session.tools.troubles)
         self.status = StatusLine(self.desk, self.hotkeys)
         self.timeline = Timeline(self.desk)
-        self.panels: dict[str, QWidget] = {"shelf": self.shelf, "timeline": self.timeline}
+        self.pose_side = PoseSide(self.desk)
+        self.panels: dict[str, QWidget] = {
+            "shelf": self.shelf, "timeline": self.timeline, "pose_map": self.pose_side}
         self.column = self._make_column()
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
@@ -124,6 +130,9 @@ class MainWindow(QMainWindow):
             ("scene", Section(PANELS["scene"][0], self.outliner, memory, "scene")),
             ("tool", ToolPanel(self.desk, memory)),
             ("respect", RespectPanel(self.desk, memory)),
+            ("controls", Section(PANELS["controls"][0], PoseControls(self.desk), memory, "controls")),
+            ("poses", Section(PANELS["poses"][0], PoseList(self.desk), memory, "poses")),
+            ("library", Section(PANELS["library"][0], PoseLibrary(self.desk), memory, "library")),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),
             ("history", Section(PANELS["history"][0], HistoryPanel(self.desk), memory, "history")),
@@ -136,7 +145,8 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
-        self.middle.addWidget(self.view)
+        self.sides = BesideView(self.view, self.pose_side)
+        self.middle.addWidget(self.sides)
         self.middle.addWidget(self.doors)
         self.split.addWidget(self.middle)
         self.split.addWidget(self.column)
@@ -369,9 +379,11 @@ class MainWindow(QMainWindow):
         visible = self._visible_panels()
         if self.desk.workspace.panels != visible:
             self.desk.session.set_workspace(panels=visible)
+        craft = self.desk.session.tool.craft
+        shown = {name for name in visible if PANEL_CRAFTS.get(name, craft) == craft}
         for name, panel in self.panels.items():
-            panel.setVisible(name in visible)
-        self.column.setVisible(any(name in visible for name in self.panels if name not in ("shelf", "timeline")))
+            panel.setVisible(name in shown)
+        self.column.setVisible(any(name in shown for name in self.panels if name not in AROUND))
 
     def _show_title(self) -> None:
         session = self.desk.session
@@ -380,7 +392,7 @@ class MainWindow(QMainWindow):
         self.setWindowModified(not session.saved)
 
     def _show_middle(self) -> None:
-        self.middle.setCurrentWidget(self.view if self.desk.document.meshes else self.doors)
+        self.middle.setCurrentWidget(self.sides if self.desk.document.meshes else self.doors)
         # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
         self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
         self.status.show_hint()
@@ -412,8 +424,9 @@ class MainWindow(QMainWindow):
         self._show_title()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
-        if old.panels != new.panels:
+        if old.panels != new.panels or old.craft != new.craft:
             self._show_panels()
+            self.status.show_hint()
 
     def _playback_changed(self) -> None:
         self.viewport.playing = self.playing

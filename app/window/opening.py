@@ -11,22 +11,28 @@ from PySide6.QtCore import QMimeData, QObject, QUrl, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.window.desk import Desk
+from app.window.file_dialog import FileDialog
 from app.window.jobs import Asked, Progress
 from core.demo import demo_document
 from core.document import Document
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.formats import mesh_file, picture
+from core.formats import mesh_file, picture, rig_file
 from core.formats.arrays import ArrayHashes
 from core.formats.mesh_file import MeshFile, read_mesh
 from core.formats.project import Project, read_project
+from core.formats.rig_assembly import NoRig, RigFile
+from core.formats.rig_file import document_of, read_rig
 from core.mesh.mesh import Mesh
 from core.workspace import Reference
 from tools.document_edits import add_empty_groom, add_mesh
+from tools.pose_edits import add_rig, play_clip_file
 from tools.session import Session
 
 PROJECT_SUFFIXES = (".filo", ".filo1")
 MESH_SUFFIXES = mesh_file.READ_SUFFIXES
+RIG_SUFFIXES = rig_file.READ_SUFFIXES
+CLIP_SUFFIXES = (".bvh",)  # motion of joints without a mesh
 PICTURE_SUFFIXES = picture.READ_SUFFIXES
 DEMO_GUIDES, DEMO_HAIRS = 2_500, 100_000
 _STAGES = 6  # of the demo, about
@@ -81,16 +87,25 @@ class Opening(QObject):
         suffix = path.suffix.lower()
         if suffix in PROJECT_SUFFIXES:
             self._open_project(path)
+        elif suffix in CLIP_SUFFIXES:
+            self._read_clip(path)
+        elif suffix in RIG_SUFFIXES:
+            self._read_rig(path, new=bool(self._desk.document.meshes))
         elif suffix in MESH_SUFFIXES or suffix in mesh_file.INSTEAD:
             self._read_mesh(path, self._open_mesh if self._desk.document.meshes else self._import_mesh)
         else:
             self._desk.error(UserError(
                 f"{path.name} is nothing that can be opened; choose a project (.filo) or a mesh "
-                f"({', '.join(MESH_SUFFIXES)})."))
+                f"({', '.join(MESH_SUFFIXES)}) or a rig ({', '.join(RIG_SUFFIXES)})."))
 
     def import_mesh(self, path: Path) -> None:
-        """Add a mesh to the document, with an empty groom to plant in."""
-        self._read_mesh(path, self._import_mesh)
+        """Add a mesh to the document, with an empty groom to plant in, or a rig to pose."""
+        if path.suffix.lower() in CLIP_SUFFIXES:
+            self._read_clip(path)
+        elif path.suffix.lower() in RIG_SUFFIXES:
+            self._read_rig(path, new=False)
+        else:
+            self._read_mesh(path, self._import_mesh)
 
     def open_demo(self) -> None:
         """Open the project's own animal, groomed."""
@@ -123,6 +138,8 @@ class Opening(QObject):
         def done(project: Project) -> None:
             session = self._make(project.document, project.workspace, path=path, hashes=hashes, name="Open")
             self._show(session, None)
+            if session.document.meshes and not session.document.grooms and self._desk.posed is not None:
+                self._desk.set_craft("pose")
             self._remember(path)
 
         self._desk.jobs.start(f"Open {path.name}", lambda progress, cancelled: read_project(path, hashes), done)
@@ -139,6 +156,49 @@ class Opening(QObject):
 
         self._desk.jobs.start(
             f"Read {path.name}", lambda progress, cancelled: read_mesh(path, cancel=cancelled), done)
+
+    def _read_rig(self, path: Path, new: bool) -> None:
+        """Open a rig in the craft of posing; a file of the format in which nothing moves is a mesh."""
+
+        def done(found: RigFile | None) -> None:
+            if found is None:
+                self._read_mesh(path, self._open_mesh if new else self._import_mesh)
+                return
+            if new:
+                self._show(self._make(document_of(found), name=f"Open {path.name}"[:255]), None)
+            elif not self._desk.edit("Import rig", add_rig, document_of(found).meshes[0]):
+                return
+            document = self._desk.document
+            self._desk.set_workspace(mesh=document.meshes[-1].id, frame=float(document.first_frame))
+            self._desk.set_craft("pose")
+            self._remember(path)
+            if found.notes:
+                self._desk.said.emit(" ".join(found.notes))
+            self.opened.emit()
+
+        def work(progress: Progress, cancelled: Asked) -> RigFile | None:
+            try:
+                found = read_rig(path, cancel=cancelled)
+            except NoRig:
+                return None
+            document_of(found)
+            return found
+
+        self._desk.jobs.start(f"Read {path.name}", work, done)
+
+    def _read_clip(self, path: Path) -> None:
+        """Let the rig that is posed play the motion of a file."""
+        item = self._desk.posed
+        if item is None:
+            self._desk.error(UserError(f"{path.name} moves joints and has no mesh; open the rig that it moves first."))
+            return
+
+        def done(found: RigFile) -> None:
+            if self._desk.edit("Import clip", play_clip_file, item.id, found.rig):
+                self._desk.set_workspace(frame=float(self._desk.document.first_frame))
+                self._desk.set_craft("pose")
+
+        self._desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: read_rig(path, cancel=cancelled), done)
 
     def _open_mesh(self, path: Path, found: MeshFile) -> None:
         document = with_mesh_to_plant(Document(), found.mesh, found.name)
@@ -167,7 +227,7 @@ class Opening(QObject):
         """Files were dropped: a project is opened, meshes are added, pictures are pinned to the view."""
         paths = [Path(url.toLocalFile()) for url in urls if url.isLocalFile()]
         kinds = {suffix: kind for kind, suffixes in (
-            ("project", PROJECT_SUFFIXES), ("mesh", MESH_SUFFIXES), ("picture", PICTURE_SUFFIXES)
+            ("picture", PICTURE_SUFFIXES), ("mesh", (*RIG_SUFFIXES, *MESH_SUFFIXES)), ("project", PROJECT_SUFFIXES),
         ) for suffix in suffixes}
         by_kind: dict[str, list[Path]] = {}
         for path in paths:
@@ -182,7 +242,7 @@ class Opening(QObject):
         if strange or not paths:
             what = strange[0].name if strange else "What was dropped"
             self._desk.error(UserError(
-                f"{what} is nothing that can be opened; drop a project (.filo), a mesh or a picture."))
+                f"{what} is nothing that can be opened; drop a project (.filo), a mesh, a rig or a picture."))
         elif len(paths) > 1 and "project" in by_kind:
             self._desk.said.emit(f"{by_kind['project'][0].name} is opened; drop the other files after it.")
 
@@ -210,8 +270,9 @@ def filter_of(words: str, suffixes: Sequence[str]) -> str:
 def open_filters() -> list[str]:
     """Filters for what :meth:`Opening.open` takes."""
     return [
-        filter_of("Projects and meshes", (*PROJECT_SUFFIXES, *MESH_SUFFIXES)),
-        filter_of("Projects", PROJECT_SUFFIXES), filter_of("Meshes", MESH_SUFFIXES), "All files (*)",
+        filter_of("Projects, meshes and rigs", (*PROJECT_SUFFIXES, *dict.fromkeys((*MESH_SUFFIXES, *RIG_SUFFIXES)))),
+        filter_of("Projects", PROJECT_SUFFIXES), filter_of("Meshes", MESH_SUFFIXES),
+        filter_of("Rigs and clips", RIG_SUFFIXES), "All files (*)",
     ]
 
 
@@ -219,15 +280,14 @@ def choose_file(
     parent: QWidget | None, title: str, filters: Sequence[str], done: Callable[[Path], object], save: str = "",
     folder: bool = False, start: Path | None = None,
 ) -> QFileDialog:
-    """Show a file dialog of Qt's own (those of systems have hung); `done` gets the path that was chosen.
+    """Show a file dialog; `done` gets the path that was chosen.
 
     Parameters
     ----------
     save : suffix a new file gets, such as ".filo"; "" to choose one that exists. folder : choose a folder instead.
     start : folder to begin in, or a file to propose; by default where the dialog before this ended.
     """
-    dialog = QFileDialog(parent, title)
-    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    dialog = FileDialog(parent, title)
     dialog.setNameFilters(list(filters))
     if save:
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)

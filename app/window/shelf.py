@@ -51,7 +51,7 @@ class Shelf(QWidget):
             button.deleteLater()
         look, known = look_of(), icon_names()
         self.buttons = {}
-        for tool in self.desk.session.tools:
+        for tool in self._tools():
             button = IconButton(tool.icon if tool.icon in known else "more", tool.label, self, look.shelf)
             button.setCheckable(True)
             button.setToolTip(self.teaching(tool))
@@ -119,9 +119,16 @@ class Shelf(QWidget):
         self.chosen.emit(name)
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
-        if old.tool != new.tool:
+        if old.craft != new.craft:
+            self.rebuild()
+            self.updateGeometry()
+        elif old.tool != new.tool:
             self._show_active()
             self._arrange()
+
+    def _tools(self) -> tuple[type[Tool[Any]], ...]:
+        """Those of the craft."""
+        return self.desk.session.tools.of(self.desk.session.tool.craft)
 
     def _show_active(self) -> None:
         active = self.desk.session.tool.name
@@ -132,7 +139,7 @@ class Shelf(QWidget):
     def _arrange(self) -> None:
         """Place as many buttons as fit, groups a little apart; the active one always has a place."""
         look = look_of()
-        side, tools = look.shelf, list(self.desk.session.tools)
+        side, tools = look.shelf, self._tools()
         x, y, group = (self.width() - side) // 2, EDGE, None
         places: list[tuple[str, int]] = []
         for tool in tools:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QKeySequence, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLabel, QMenu, QSizePolicy, QToolButton, QWidget
 
 from app.window.commands import Commands
 from app.window.desk import Desk
@@ -35,8 +35,7 @@ class TopBar(QWidget):
         self.menu_button.setToolTip("Every command by category. F10 opens it, arrow keys walk through it.")
         self.menu_button.setAccessibleName("Menu")
         self.menu_button.clicked.connect(self.open_menu)
-        self.craft = QLabel("Groom")
-        self.craft.setToolTip("The craft you are at: its tools and panels work on the document.")
+        self.crafts = CraftSwitch(desk)
         self.file = QLabel()
         self.palette_field = FindField(lambda: commands.run("window.palette"), hotkeys)
         self._again = QTimer(self, singleShot=True, interval=LOOK_AGAIN)
@@ -44,7 +43,7 @@ class TopBar(QWidget):
         line = QHBoxLayout(self)
         line.setContentsMargins(12, 4, 8, 4)
         line.setSpacing(12)
-        for widget in (self.name, self.menu_button, self.craft):
+        for widget in (self.name, self.menu_button, self.crafts):
             line.addWidget(widget)
         line.addStretch(1)
         line.addWidget(self.file)
@@ -75,9 +74,7 @@ class TopBar(QWidget):
         look = look_of()
         self.name.setFont(_bold(text_font(look, look.text + 1)))
         self.name.setStyleSheet(f"color: {look.theme.accent}")
-        self.craft.setStyleSheet(
-            f"color: {look.theme.accent}; background: {look.theme.accent_ground}; border-radius: 5px; "
-            f"padding: {look.grid}px {2 * look.gap}px")
+        self.crafts.take_look()
         self.file.setStyleSheet(f"color: {look.theme.dim}")
 
     def menu(self) -> QMenu:
@@ -108,6 +105,44 @@ class TopBar(QWidget):
 
     def _soon(self) -> None:
         self._again.start()
+
+
+class CraftSwitch(QWidget):
+    """The crafts there are, as words side by side; the active one in the accent colour."""
+
+    def __init__(self, desk: Desk) -> None:
+        super().__init__()
+        self._desk = desk
+        self.buttons: dict[str, QToolButton] = {}
+        self._group = QButtonGroup(self)
+        line = QHBoxLayout(self)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.setSpacing(2)
+        for name, craft in desk.session.tools.crafts.items():
+            button = self.buttons[name] = QToolButton()
+            button.setText(craft.label)
+            button.setCheckable(True)
+            button.setAccessibleName(f"{craft.label} craft")
+            button.setToolTip(f"{craft.label}: its tools and panels work on the same document; nothing is lost.")
+            button.clicked.connect(lambda _=False, name=name: desk.set_craft(name))
+            self._group.addButton(button)
+            line.addWidget(button)
+        desk.workspace_changed.connect(lambda old, new: self.refresh())
+        desk.session_replaced.connect(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show which craft is active."""
+        self.buttons[self._desk.session.tool.craft].setChecked(True)
+
+    def take_look(self) -> None:
+        """Take the colours and sizes of the theme."""
+        look = look_of()
+        self.setStyleSheet(
+            f"QToolButton {{ color: {look.theme.dim}; background: transparent; border: none; border-radius: 5px; "
+            f"padding: {look.grid}px {2 * look.gap}px }}"
+            f"QToolButton:hover {{ color: {look.theme.text} }}"
+            f"QToolButton:checked {{ color: {look.theme.accent}; background: {look.theme.accent_ground} }}")
 
 
 class FindField(QWidget):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.window.commands import Command, Window
+from tools.registry import CRAFTS
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
@@ -16,10 +17,18 @@ PANELS = {
     "scene": ("Scene", "Shows or hides the list of meshes and grooms at the right."),
     "tool": ("Tool settings", "Shows or hides the settings of the tool in your hand."),
     "respect": ("Respect", "Shows or hides what tools heed: hairspray, selection and symmetry."),
+    "controls": ("Controls", "Shows or hides the sliders of joints and dials that pose the rig."),
+    "poses": ("Poses", "Shows or hides sculpted poses, their layers and how far each of them reaches."),
+    "library": ("Pose library", "Shows or hides the poses that are kept by name for later."),
+    "pose_map": ("Pose map", "Shows or hides the map of pose space beside the model."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
     "history": ("History", "Shows or hides the list of steps that undo goes through."),
     "timeline": ("Timeline", "Shows or hides frames and playback at the bottom of the window."),
+}
+# panels that belong to one craft; the others are those of all
+PANEL_CRAFTS = {
+    "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "pose_map": "pose",
 }
 TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels
 _SETTINGS = "app.window.settings.save_settings"
@@ -48,7 +57,16 @@ def _text(direction: int) -> Callable[[Window], None]:
     return run
 
 
+def _craft(name: str) -> Command:
+    label = next(craft.label for craft in CRAFTS if craft.name == name)
+    return Command(
+        f"window.craft_{name}", f"{label} craft", f"Shows the tools and panels of {label} over the same document.",
+        lambda w: w.desk.set_craft(name), "tools.session.Session.set_craft",
+        checked=lambda desk: desk.session.tool.craft == name, words="craft mode switch workspace")
+
+
 WINDOW: tuple[Command, ...] = (
+    *(_craft(craft.name) for craft in CRAFTS),
     *(
         Command(
             f"window.{name}", f"{label} panel", tooltip, _toggle(name), _WORKSPACE, checked=_visible(name),

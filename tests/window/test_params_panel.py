@@ -290,8 +290,8 @@ def test_a_folded_section_leaves_no_hole(qtbot: QtBot, tmp_path: Path) -> None:
 def test_the_shelf_has_every_tool_and_shows_the_active_one(qtbot: QtBot, desk: Desk) -> None:
     shelf = Shelf(desk, lambda name: "C" if name == "comb" else "")
     shown(qtbot, shelf, shelf.sizeHint().width(), 900)
-    assert list(shelf.buttons) == [tool.name for tool in desk.session.tools]
-    for tool in desk.session.tools:
+    assert list(shelf.buttons) == [tool.name for tool in desk.session.tools.of("groom")]
+    for tool in desk.session.tools.of("groom"):
         QTest.mouseClick(shelf.buttons[tool.name], LEFT)
         assert desk.session.tool.name == tool.name
         assert [name for name, button in shelf.buttons.items() if button.isChecked()] == [tool.name]
@@ -299,6 +299,16 @@ def test_the_shelf_has_every_tool_and_shows_the_active_one(qtbot: QtBot, desk: D
     assert ">C<" in shelf.buttons["comb"].toolTip()
     QTest.mouseClick(shelf.buttons[desk.session.tool.name], LEFT)  # again: it stays lit
     assert shelf.buttons[desk.session.tool.name].isChecked()
+
+
+def test_the_shelf_shows_the_tools_of_the_craft(qtbot: QtBot, desk: Desk) -> None:
+    shelf = Shelf(desk)
+    shown(qtbot, shelf, shelf.sizeHint().width(), 900)
+    desk.set_craft("pose")
+    assert list(shelf.buttons) == [tool.name for tool in desk.session.tools.of("pose")]
+    assert shelf.buttons[desk.session.tool.name].isChecked()
+    desk.set_craft("groom")
+    assert "comb" in shelf.buttons
 
 
 def test_a_low_shelf_has_a_menu_of_the_others(qtbot: QtBot, desk: Desk) -> None:

@@ -1,0 +1,174 @@
+"""The craft of posing in the real window: rigs open in it, sliders and the map pose them, lists follow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from app.window.pose_controls import PoseControls
+from app.window.pose_list import PoseLibrary, PoseList
+from core.demo.pose_document import pose_document
+from core.document import Document
+from core.pose.pose import REST
+from core.pose.rotation import quaternion_from_euler
+from core.posed import shown_points
+from tests.window.conftest import Opened
+from tests.window.hand import Hand
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture(scope="module")
+def rigs() -> Document:
+    return pose_document()
+
+
+@pytest.fixture
+def posing(opened: Opened, rigs: Document) -> Hand:
+    """A hand at a window with the arm and the face, in the craft of posing."""
+    hand = opened(rigs)
+    hand.window.resize(1500, 900)
+    hand.window.desk.set_craft("pose")
+    hand.rest()
+    return hand
+
+
+def part(hand: Hand, kind: type[QWidget]) -> QWidget:
+    return hand.window.findChild(kind)
+
+
+def test_crafts_are_words_at_the_top_with_their_own_tools_and_panels(opened: Opened, rigs: Document) -> None:
+    window = opened(rigs).window
+    QTest.mouseClick(window.top.crafts.buttons["pose"], LEFT)
+    assert window.desk.workspace.craft == "pose"
+    assert window.panels["controls"].isVisible()
+    assert window.pose_side.isVisible()
+    assert not window.panels["coat"].isVisible()
+    assert "grab" in window.shelf.buttons
+    QTest.mouseClick(window.top.crafts.buttons["groom"], LEFT)
+    assert not window.pose_side.isVisible()
+    assert window.panels["coat"].isVisible()
+    assert next(iter(window.shelf.buttons)) == window.desk.session.tools.of("groom")[0].name
+
+
+def test_a_slider_turns_the_joint_and_is_one_step(posing: Hand) -> None:
+    desk, controls = posing.window.desk, part(posing, PoseControls)
+    assert controls.joint.value() == "elbow"
+    for value, final in ((0.5, False), (1.2, False), (1.2, True)):
+        controls.angles[2].set_value(value)
+        controls.angles[2].edited.emit(value, final)
+    assert list(desk.session.history.names)[1:] == ["Pose"]
+    assert desk.document.meshes[0].pose.rotations["elbow"] == pytest.approx(
+        quaternion_from_euler((0, 0, math.degrees(1.2))), abs=1e-9)
+    QTest.mouseClick(controls.play, LEFT)
+    assert desk.document.meshes[0].pose is None
+
+
+def test_the_dot_of_the_map_takes_the_model_along(posing: Hand) -> None:
+    desk, canvas = posing.window.desk, posing.window.pose_side.map.canvas
+    desk.set_workspace(mesh=2)
+    posing.rest()
+    assert [s.name for s in canvas.chart.space.samples] == ["joy", "anger", "sadness", "calm"]
+    start, end = canvas.to_pixel(canvas.dot).toPoint(), canvas.to_pixel(np.array([0.5, 0.25])).toPoint()
+    before = shown_points(desk.document.meshes[1], 1001.0, desk.session.evaluator)
+    QTest.mousePress(canvas, LEFT, pos=start + QPoint(9, 0))
+    QTest.mouseMove(canvas, (start + end) / 2)
+    QTest.mouseMove(canvas, end)
+    assert desk.session.history.names == ("New",)  # a preview
+    QTest.mouseRelease(canvas, LEFT, pos=end)
+    pose = desk.document.meshes[1].pose
+    axes = [axis.dof.control for axis in canvas.chart.axes]
+    assert [pose.numbers[name] for name in axes] == pytest.approx(
+        canvas.to_place(QPointF(end)), abs=1e-9)
+    assert [pose.numbers[name] for name in axes] == pytest.approx([0.5, 0.25], abs=0.02)
+    after = shown_points(desk.document.meshes[1], 1001.0, desk.session.evaluator)
+    assert np.abs(after - before).max() > 1e-3
+
+
+def test_a_click_on_a_pose_of_the_map_holds_it(posing: Hand) -> None:
+    desk, canvas = posing.window.desk, posing.window.pose_side.map.canvas
+    where = canvas.to_pixel(canvas.chart.spots[1]).toPoint()
+    QTest.mouseClick(canvas, LEFT, pos=where)
+    sample = canvas.chart.space.samples[0]
+    assert desk.document.meshes[0].pose.rotations == sample.pose.rotations
+    assert canvas.chosen == 1
+
+
+def test_the_map_of_all_poses_mixes_those_near_the_dot(posing: Hand) -> None:
+    desk, side = posing.window.desk, posing.window.pose_side
+    desk.set_workspace(mesh=2)
+    side.map.across.enter("all poses (by distance)")
+    chart = side.map.canvas.chart
+    assert chart.axes is None
+    joy = [s.name for s in chart.space.samples].index("joy")
+    assert side.map.pose_of(tuple(chart.spots[1 + joy])).numbers == pytest.approx(
+        chart.space.samples[joy].pose.numbers)
+
+
+def test_the_heat_of_the_map_is_painted_by_a_job(posing: Hand) -> None:
+    posing.rest()
+    values = posing.window.pose_side.map.canvas._heat[0]
+    assert values.max() == pytest.approx(1.0, abs=0.05)
+    assert abs(values[len(values) // 2].min()) < 0.3
+
+
+def test_the_list_has_the_layers_and_holds_a_pose(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    top = [poses.list.topLevelItem(i) for i in range(poses.list.topLevelItemCount())]
+    assert [item.child(0).text(0) for item in top] == ["elbow bent", "shoulder raised", "forearm twisted"]
+    poses.list.setCurrentItem(top[2].child(0))
+    poses.list.itemClicked.emit(top[2].child(0), 0)
+    assert list(desk.document.meshes[0].pose.rotations) == ["wrist"]
+    assert poses.falloffs["wrist"].value() > 0.0
+    poses.falloffs["wrist"].enter(0.5)
+    layer = desk.document.meshes[0].correctives.layers[2]
+    assert layer.space.samples[0].falloffs["wrist"] == (0.5,)
+    top = poses.list.topLevelItem(0)
+    top.setCheckState(0, Qt.CheckState.Unchecked)
+    assert not desk.document.meshes[0].correctives.layers[0].enabled
+    assert list(desk.session.history.names)[1:] == ["Pose", "Falloff", "Hide layer"]
+
+
+def test_methods_are_compared_by_a_switch(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    poses.way.enter("linear")
+    assert {layer.kind for layer in desk.document.meshes[0].correctives.layers} == {"linear"}
+    assert desk.session.history.undo_name == "Method"
+
+
+def test_a_sculpt_at_a_taken_pose_is_refused_in_words(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    said: list[str] = []
+    desk.failed.connect(lambda words, details: said.append(words))
+    desk.edit("Pose", lambda document, i: document.replace(meshes=(
+        document.meshes[0].replace(pose=REST), *document.meshes[1:])), 1)
+    QTest.mouseClick(poses.buttons["add"], LEFT)
+    assert said
+    assert "rest" in said[0]
+
+
+def test_poses_are_kept_in_the_library_and_held_again(posing: Hand) -> None:
+    desk, library, controls = posing.window.desk, part(posing, PoseLibrary), part(posing, PoseControls)
+    controls.angles[0].edited.emit(0.0, True)
+    library.keep("first try")
+    QTest.mouseClick(controls.rest, LEFT)
+    assert [pose.name for pose in desk.document.meshes[0].library] == ["first try"]
+    library.list.itemClicked.emit(library.list.topLevelItem(0), 0)
+    assert desk.document.meshes[0].pose.name == "first try"
+    library.list.topLevelItem(0).setSelected(True)
+    QTest.mouseClick(library.forget_button, LEFT)
+    assert desk.document.meshes[0].library == ()
+
+
+def test_map_and_model_stand_over_one_another_in_a_narrow_window(posing: Hand) -> None:
+    window = posing.window
+    assert window.sides.orientation() == Qt.Orientation.Horizontal
+    window.resize(900, 700)
+    posing.rest()
+    assert window.sides.orientation() == Qt.Orientation.Vertical
+    assert window.viewport.width() > 300
