@@ -18,7 +18,10 @@ import typer
 from core.errors import UserError
 
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
-COMMANDS = ("window", "groom", "convert", "info", "check", "render", "pose", "track", "flow", "run", "bench", "doctor", "demo")
+COMMANDS = (
+    "window", "groom", "convert", "info", "check", "render", "pose", "track",
+    "flow", "run", "bench", "doctor", "demo",
+)
 HELP = ("-h", "--help")
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from core.errors import UserError
 from core.field import field
 from core.groom.groom import Groom
+from core.image.plate import Plate
+from core.match.track import Track
 from core.mesh.mesh import Mesh
 from core.pose.pose import Pose
 from core.pose.pose_space import Correctives
@@ -70,7 +72,7 @@ class MeshObject(Record):
 class Document(Record):
     """Everything undo brings back.
 
-    meshes, grooms : each with ids unique among their kind.
+    meshes, grooms, plates, tracks : each with ids unique among their kind. A track is of a plate.
     """
 
     unit: Annotated[str, field(
@@ -91,6 +93,8 @@ class Document(Record):
     )] = 1100
     meshes: tuple[MeshObject, ...] = ()
     grooms: tuple[Groom, ...] = ()
+    plates: tuple[Plate, ...] = ()
+    tracks: tuple[Track, ...] = ()
 
     def __post_init__(self) -> None:
         if self.unit not in METRES_PER_UNIT:
@@ -102,6 +106,12 @@ class Document(Record):
         mesh_ids = {m.id for m in self.meshes}
         if len(mesh_ids) != len(self.meshes) or len({g.id for g in self.grooms}) != len(self.grooms):
             raise ValueError("Document holds two things of the same id")
+        plate_ids = {plate.id for plate in self.plates}
+        if len(plate_ids) != len(self.plates) or len({track.id for track in self.tracks}) != len(self.tracks):
+            raise ValueError("Document holds two plates or two tracks of the same id")
+        for track in self.tracks:
+            if track.plate_id not in plate_ids:
+                raise ValueError(f"Document.tracks: the plate {track.plate_id} of track {track.name!r} does not exist")
         for groom in self.grooms:
             if groom.mesh_id not in mesh_ids:
                 raise ValueError(f"Document.grooms: the mesh {groom.mesh_id} of groom {groom.name!r} does not exist")

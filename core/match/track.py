@@ -111,12 +111,12 @@ class Track(Record):
 
     id: int
     name: str
-    keys: NDArray[np.float64]
-    frames: NDArray[np.int32]
-    points: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    own: NDArray[np.float64]
-    score: NDArray[np.float64]
+    keys: np.ndarray
+    frames: np.ndarray
+    points: np.ndarray
+    covariance: np.ndarray
+    own: np.ndarray
+    score: np.ndarray
     plate_id: int = 0
     hidden: bool = False
     locked: bool = False

@@ -1,0 +1,101 @@
+"""The pattern tracker beside Blender's, on plates whose truth is known (FILOPLUME_TRACK_PLATES names their folder).
+
+The folder holds what ``make_plate.py`` of the peers makes: ``*c`` clean, ``*h`` with changing light and motion blur.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from core.errors import UserError
+from core.formats.frame_decoder import FrameDecoder
+from core.formats.plate_file import PlateFrames, read_plate
+from core.image.mix import mixed
+from core.image.plate import ChannelMix
+from core.match.track import TrackSettings, keyed_track
+from core.match.tracker import Tracking
+from core.workers import Workers
+from tests.bench.bench import Row
+
+TITLE = "Pattern tracker"
+
+
+def run() -> list[Row]:
+    folder = os.environ.get("FILOPLUME_TRACK_PLATES")
+    plates = sorted(p.parent for p in Path(folder).glob("*/truth.npy")) if folder else []
+    if not plates:
+        raise UserError("FILOPLUME_TRACK_PLATES names no folder of plates made by make_plate.py")
+    rows, pooled = [], {"c": [], "h": []}
+    for plate in plates:
+        kind = plate.name[-1]
+        ours = _ours(plate, kind == "h")
+        pooled[kind].append(ours["chi2"])
+        peer = _blender(plate, kind == "h")
+        rows.append(Row(f"{plate.name}: tracks kept of {ours['tracks']}", ours["good"], "", ours["tracks"], True))
+        for figure in ("median_px", "p90_px"):
+            most = None if peer is None else (0.75 if kind == "c" else 0.4) * peer[figure]
+            rows.append(Row(f"{plate.name}: {figure[:-3]} drift", ours[figure], "px", most))
+        least = None if peer is None else 0.8 * peer["ms_per_track_frame"]
+        rows.append(Row(f"{plate.name}: time of track and frame", ours["ms_per_track_frame"], "ms", least))
+    for kind, values in pooled.items():
+        if values:
+            rows.append(
+                Row(f"normalised chi-square, pooled over {len(values)} plates {kind}", float(np.mean(values)), "", 1.25)
+            )
+    return rows
+
+
+def _ours(plate: Path, blur: bool) -> dict:
+    import time
+
+    truth = np.load(plate / "truth.npy")
+    decoder, workers = FrameDecoder(), Workers(2)
+    film = read_plate(plate / "plate.####.png", decoder)
+    frames, mix = PlateFrames(film, decoder), ChannelMix()
+    tracks = tuple(keyed_track(k + 1, f"t{k}", np.array([[film.first, *path[0]]])) for k, path in enumerate(truth))
+    for _ in range(2):  # the second time kernels and pages are warm, as a peer's are
+        tracking = Tracking(
+            lambda k: mixed(frames.get(k), mix), film.frames, tracks, TrackSettings(blur=blur), ranges=workers.ranges
+        )
+        start = time.perf_counter()
+        for _ in tracking.steps():
+            pass
+        seconds = time.perf_counter() - start
+    frames.close()
+    decoder.close()
+    workers.close()
+    made = tracking.tracks()
+    paths = np.full(truth.shape, np.nan)
+    chi2 = []
+    for row, track in enumerate(made):
+        at = track.frames - film.first
+        paths[row, at] = track.points
+        error, c = (track.points - truth[row, at])[1:], track.covariance[1:]
+        det = c[:, 0] * c[:, 2] - c[:, 1] ** 2
+        cross = 2.0 * error[:, 0] * error[:, 1] * c[:, 1]
+        chi2.append((error[:, 0] ** 2 * c[:, 2] - cross + error[:, 1] ** 2 * c[:, 0]) / det / 2.0)
+    error = np.linalg.norm(paths - truth, axis=2)
+    last = error[:, -1]
+    good = ~np.isnan(last) & (np.nanmax(error, axis=1) < 3)
+    return {
+        "tracks": len(truth), "good": int(good.sum()), "median_px": float(np.nanmedian(last)),
+        "p90_px": float(np.nanpercentile(last, 90)), "chi2": float(np.mean(np.concatenate(chi2))),
+        "ms_per_track_frame": 1e3 * seconds / max(1, tracking.observations),
+    }  # fmt: skip
+
+
+def _blender(plate: Path, normalize: bool) -> dict | None:
+    """Blender's affine keyframe tracker, by ``blender_track.py``, when FILOPLUME_PEERS names a Python."""
+    peers, data = os.environ.get("FILOPLUME_PEERS"), os.environ.get("FILOPLUME_DATA")
+    script = Path(data).parent / "peers" / "blender_track.py" if data else None
+    if not peers or script is None or not script.is_file():
+        return None
+    command = [peers, str(script), str(plate), *(["--normalize"] if normalize else [])]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    return json.loads(lines[-1]) if lines else None
