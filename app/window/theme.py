@@ -111,6 +111,8 @@ def load_theme(name: str) -> Theme:
 def apply(app: QApplication, theme: Theme, text_size: int = 12) -> Look:
     """Give the whole program a theme and a size of text (held within 10 .. 20 pixels); any number of times."""
     look = Look(theme=theme, text=min(max(text_size, SMALLEST_TEXT), LARGEST_TEXT))
+    # Another sheet in place of one makes Qt polish a widget once for each of its ancestors; from none to one, once.
+    app.setStyleSheet("")
     if app.style().objectName() != "fusion":
         app.setStyle(QStyleFactory.create("Fusion"))
     app.setProperty(_PROPERTY, look)
