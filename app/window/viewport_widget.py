@@ -39,6 +39,7 @@ from app.window.gestures import BrushDrag, Gestures
 from app.window.hotkeys import Hotkeys
 from app.window.live_picture import LivePicture, Stopwatch
 from app.window.navigation import CameraDrag, Eye
+from app.window.pose_overlay import skeleton_of
 from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
 from app.window.theme import look_of, text_font
 from core.document import Document
@@ -258,8 +259,9 @@ class Viewport(QOpenGLWindow):
 
     def _overlays(self) -> Overlays:
         gestures, pointer = self.gestures, self._pointer
+        under = skeleton_of(self.desk, self.eye.camera, self.pixels(), self.devicePixelRatio())
         if pointer is None or isinstance(gestures.drag, CameraDrag):
-            return gestures.overlays()
+            return under + gestures.overlays()
         if isinstance(gestures.drag, BrushDrag):
             pointer = pointer._replace(x=gestures.drag.x, y=gestures.drag.y)
         width, height = self.pixels()
@@ -270,7 +272,7 @@ class Viewport(QOpenGLWindow):
         except Exception as error:  # of a studio's own tool: the picture goes on without its marks
             self.desk.error(UserError(f"{self.desk.session.tool.label} cannot show its ring ({error})."))
             ring = ()
-        return ring + gestures.overlays()
+        return under + ring + gestures.overlays()
 
     def _hud_lines(self) -> list[HudLine]:
         picture, now = self.picture, time.monotonic()

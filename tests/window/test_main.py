@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from app.window.commands import Window
 from app.window.settings import load_settings
 from app.window.theme import look_of
-from app.window.window_commands import PANELS
+from app.window.window_commands import PANEL_CRAFTS, PANELS
 from core.document import Document
 from core.formats.journal import state_folder
 from core.formats.project import read_project
@@ -64,8 +64,9 @@ def test_closing_keeps_unsaved_work_for_the_next_start(opened: Opened, animal: D
 
 
 @pytest.mark.parametrize("name", list(PANELS))
-def test_panels_are_shown_and_hidden(name: str, opened: Opened) -> None:
-    window = opened().window
+def test_panels_are_shown_and_hidden(name: str, opened: Opened, animal: Document) -> None:
+    window = opened(animal).window
+    window.desk.set_craft(PANEL_CRAFTS.get(name, "groom"))
     panel = window.panels[name]
     assert panel.isVisible()
     window.commands.run(f"window.{name}")
