@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.pose.controls import rests
-from core.pose.layers import Extracted, LayerReport, anchors_of, extract_layer, space_dofs
+from core.pose.layers import UNMOVED, Extracted, LayerReport, anchors_of, diagonal, extract_layer, space_dofs
 from core.pose.pose import Pose, moved_controls
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
@@ -41,14 +41,14 @@ def refresh(
     before = prepare(kept, rig)
     for i, layer in enumerate(correctives.layers):
         if i >= first and kept is not None:
-            layer = _with_all_vertices(layer, len(points))
+            layer = _with_vertices(layer, np.arange(len(points), dtype=np.int32))
         if i >= first:
             below = [s.pose for lower in layers for s in lower.space.samples]
             space = layer.space.replace(anchors=anchors_of(layer.space, below))
             targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
             if kept is not None:
                 poses = [s.pose for s in space.samples]
-                whole = np.array([evaluate(points, rig, kept, pose, prepared=before) for pose in poses])
+                whole = np.array([evaluate(points, rig, kept, pose, prepared=before)[layer.vertices] for pose in poses])
                 targets = np.where(layer.moved[..., None], layer.targets, whole)
             layer, report = extract_layer(
                 points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer)
@@ -87,20 +87,23 @@ def add_sculpt(
         above = (i for i, layer in enumerate(layers) if set(layer.space.controls) > set(controls))
         at = next(above, len(layers))
         space = PoseSpace(dofs=space_dofs(rig, [pose], controls, dofs), samples=(sample,), **options)
-        layers.insert(at, _layer(_free_name(layers, controls), space, np.arange(len(points), dtype=np.int32)))
+        layers.insert(at, _layer(_free_name(layers, controls), space, np.zeros(0, np.int32)))
         layer = layers[at]
     else:
         layer = layers[at]
-        layer = _with_all_vertices(layer, len(points))
         layer = _resampled(layer, (*layer.space.samples, sample), [*range(len(layer.space.samples)), None])
-    targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
-    targets[-1] = np.asarray(target, np.float32)[layer.vertices]
     ready = prepare(Correctives(layers=tuple(layers[:at])), rig)
+    sculpted = np.asarray(target, np.float32)
+    layer = _with_vertices(layer, _perhaps_moved(points, rig, ready, pose, sculpted))
+    targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
+    targets[-1] = sculpted[layer.vertices]
     below = [s.pose for lower in layers[:at] for s in lower.space.samples]
     space = layer.space.replace(anchors=anchors_of(layer.space, below))
     layers[at], report = extract_layer(
         points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer,
         (len(space.samples) - 1,))
+    if at + 1 == len(layers):
+        return Extracted(Correctives(layers=tuple(layers)), (report,))
     rest = refresh(points, rig, Correctives(layers=tuple(layers)), at + 1, kept)
     return Extracted(rest.correctives, (report, *rest.reports))
 
@@ -245,14 +248,35 @@ def _layer(name: str, space: PoseSpace, vertices: NDArray[np.int32]) -> PoseLaye
         targets=freeze(np.zeros((*shape, 3), np.float32)))
 
 
-def _with_all_vertices(layer: PoseLayer, count: int) -> PoseLayer:
-    empty = _layer(layer.name, layer.space, np.arange(count, dtype=np.int32))
-    moved, deltas, targets = empty.moved.copy(), empty.deltas.copy(), empty.targets.copy()
-    moved[:, layer.vertices], deltas[:, layer.vertices] = layer.moved, layer.deltas
-    targets[:, layer.vertices] = layer.targets
-    whole: PoseLayer = empty.replace(
-        kind=layer.kind, enabled=layer.enabled, moved=freeze(moved), deltas=freeze(deltas), targets=freeze(targets))
+def _with_vertices(layer: PoseLayer, vertices: NDArray[np.int32]) -> PoseLayer:
+    """The layer with these vertices among its own, in whatever order; nobody has moved the new ones."""
+    new = np.setdiff1d(vertices, layer.vertices).astype(np.int32)
+    if not len(new):
+        return layer
+
+    def wider(array: NDArray[Any]) -> NDArray[Any]:
+        axis = min(1, array.ndim - 1)
+        shape = (*array.shape[:axis], len(new), *array.shape[axis + 1 :])
+        return freeze(np.concatenate([array, np.zeros(shape, array.dtype)], axis=axis))
+
+    whole: PoseLayer = layer.replace(
+        vertices=freeze(np.concatenate([layer.vertices, new])), moved=wider(layer.moved), after=wider(layer.after),
+        deltas=wider(layer.deltas), targets=wider(layer.targets))
     return whole
+
+
+def _perhaps_moved(
+    points: NDArray[np.float32], rig: Rig, below: Sequence[Prepared], pose: Pose, target: NDArray[np.float32]
+) -> NDArray[np.int32]:
+    """Vertices that a sculpt may have moved: those not just where the layers below put them, as near as float32 tells.
+
+    What is moved by more than may be ignored is certainly among them.
+    """
+    posed = evaluate(points, rig, None, pose, prepared=tuple(below))
+    rounding = 2.0 * float(np.finfo(np.float32).eps) * float(np.abs(posed).max(initial=0.0))
+    least = max(UNMOVED * diagonal(points) / np.sqrt(3.0) - rounding, 0.0)
+    near = np.abs(target - posed) <= least
+    return np.flatnonzero(~(near[:, 0] & near[:, 1] & near[:, 2])).astype(np.int32)
 
 
 def _resampled(layer: PoseLayer, samples: tuple[PoseSample, ...], sources: Sequence[int | None]) -> PoseLayer:

@@ -152,10 +152,11 @@ def extract_layer(
         Naming the poses that cannot be told apart.
     """
     solve(space)
-    least = UNMOVED * float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    least = UNMOVED * diagonal(points)
     poses, count = [s.pose for s in space.samples], len(space.samples)
     new = [k for k in range(count) if fresh is None or k in fresh]
-    given = np.isfinite(targets).all(axis=2)
+    finite = np.isfinite(targets)
+    given = finite[..., 0] & finite[..., 1] & finite[..., 2]
     sampled = np.zeros(given.shape, np.bool_) if moved is None else moved & given
     surfaces = np.where(given[..., None], targets, 0.0).astype(np.float64)
     states = {k: _state(points, rig, below, poses[k], vertices) for k in new}
@@ -199,6 +200,11 @@ def extract_layer(
     report = LayerReport(
         name, tuple(p.name for p in poses), layer.vertices, condition[:, order].astype(np.float32), layer.after)
     return layer, report
+
+
+def diagonal(points: NDArray[np.float32]) -> float:
+    """Of the box around points (V, 3); 0 without any. By columns, many times as fast as along the first axis."""
+    return float(np.linalg.norm([np.ptp(points[:, k]) for k in range(3)])) if len(points) else 0.0
 
 
 class _State(NamedTuple):

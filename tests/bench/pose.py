@@ -12,7 +12,7 @@ from core.pose.blend_shapes import targets_from_dense
 from core.pose.edit_layers import add_sculpt
 from core.pose.embedding import embed, scales
 from core.pose.layers import Sculpt, build
-from core.pose.pose import Pose
+from core.pose.pose import Pose, local_of_pose
 from core.pose.pose_space import Correctives, Dof, PoseLayer, PoseSample, PoseSpace
 from core.pose.rig import Control, Rig
 from core.pose.skeleton import Skeleton, SkinWeights
@@ -155,17 +155,17 @@ def _adding() -> list[Row]:
     rig, points = _rig(100_000, 3)
     refresh = median_ms(lambda: prepare(Correctives(layers=(layer,)), rig), runs=15)
     rows = [Row("a pose added to 32: system and runs of 100,000 vertices anew", refresh, "ms", 20.0)]
-    rig, points = _rig(10_000, 3)
-    made = [Sculpt(p, _dented(points, rig, p, k)) for k, p in enumerate(_poses(33, 3))]
+    ring = np.argsort(np.linalg.norm(points - points[0], axis=1))[:2000]
+    made = [Sculpt(p, _dented(points, rig, p, k, ring)) for k, p in enumerate(_poses(33, 3))]
     have = build(points, rig, made[:-1]).correctives
     last = made[-1]
-    whole = median_ms(lambda: add_sculpt(points, rig, have, last.pose, last.target), runs=3)
-    rows.append(Row("a sculpt added to 32 that move the same 10,000 vertices, extracted and arranged", whole, "ms"))
+    whole = median_ms(lambda: add_sculpt(points, rig, have, last.pose, last.target), runs=9)
+    rows.append(Row("a sculpt of a ring over 2 % of 100,000 vertices added to 32, as a whole", whole, "ms", 20.0))
     return rows
 
 
-def _dented(points: np.ndarray, rig: Rig, pose: Pose, seed: int) -> np.ndarray:
-    from core.pose.pose import local_of_pose
-
+def _dented(points: np.ndarray, rig: Rig, pose: Pose, seed: int, ring: np.ndarray) -> np.ndarray:
     push = np.random.default_rng(seed).normal(size=3).astype(np.float32) * np.float32(0.01)
-    return deformed(points, rig, local_of_pose(rig.skeleton, pose)) + push
+    out = deformed(points, rig, local_of_pose(rig.skeleton, pose))
+    out[ring] += push
+    return out
