@@ -68,17 +68,19 @@ def repair(polygons: Polygons, kinds: NDArray[np.generic] | None = None) -> Repa
     """
     met: dict[str, int] = {}
     points, bad = _finite_points(polygons.points, met)
-    kept = _usable_faces(polygons, bad, met)
-    faces = _take_faces(polygons, kept)
+    kept, faces = _clean_faces(polygons, bad, met)
     edges = Edges.of(faces.counts, faces.corners, len(points))
-    vertex_of_source = _join_open_edges(points, faces.counts, faces.corners, faces.parts, edges, met, kinds)
-    stays = vertex_of_source == np.arange(len(points))
-    if not stays.all():
-        vertex_of_source = (np.cumsum(stays) - 1)[vertex_of_source]
-        points, bad = points[stays], bad[stays]
-        joined = faces._replace(corners=vertex_of_source[faces.corners])
-        still = _usable_faces(joined, bad & False, met)
-        kept, faces = kept[still], _take_faces(joined, still)
+    vertex_of_source = np.arange(len(points))
+    while True:  # faces that fall away may leave open edges to be joined
+        target = _join_open_edges(points, faces.counts, faces.corners, faces.parts, edges, met, kinds)
+        stays = target == np.arange(len(points))
+        if stays.all():
+            break
+        target = (np.cumsum(stays) - 1)[target]
+        vertex_of_source = target[vertex_of_source]
+        points, bad, kinds = points[stays], bad[stays], None if kinds is None else kinds[stays]
+        still, faces = _clean_faces(faces._replace(corners=target[faces.corners]), bad & False, met)
+        kept = kept[still]
         edges = Edges.of(faces.counts, faces.corners, len(points))
     counts, corners = faces.counts, faces.corners
     met["flipped_faces"] = orient(points, counts, corners, faces.uvs, edges)
@@ -104,6 +106,18 @@ def _finite_points(points: NDArray[np.float64], met: dict[str, int]) -> tuple[ND
             raise UserError("None of its vertices is a finite number; export it again.")
         points = np.where(bad[:, None], points[~bad].mean(axis=0), points)
     return points, bad
+
+
+def _clean_faces(
+    polygons: Polygons, bad: NDArray[np.bool_], met: dict[str, int]
+) -> tuple[NDArray[np.int64], Polygons]:
+    """Rows of the faces that can be used, and those faces without corners that say nothing new."""
+    kept, faces, corners = np.arange(len(polygons.counts)), polygons, -1
+    while len(faces.corners) != corners:  # a ring that got shorter may repeat another face
+        corners = len(faces.corners)
+        still = _usable_faces(faces, bad, met)
+        kept, faces = kept[still], _take_faces(faces, still)
+    return kept, faces
 
 
 def _usable_faces(polygons: Polygons, bad: NDArray[np.bool_], met: dict[str, int]) -> NDArray[np.int64]:
@@ -241,7 +255,7 @@ def _join_open_edges(
     first = np.full(total, len(points))
     np.minimum.at(first, label, same)
     target = first[label]
-    met["duplicate_vertices"] = int((target != same).sum())
+    met["duplicate_vertices"] = met.get("duplicate_vertices", 0) + int((target != same).sum())
     return target
 
 

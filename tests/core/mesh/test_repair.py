@@ -233,6 +233,13 @@ def test_whatever_comes_in_what_goes_out_is_sound(seed):
     assert not {"out_of_range_faces", "nonfinite_faces", "degenerate_faces", "duplicate_faces"} & set(again.problems)
 
 
+def test_a_face_that_repeats_another_once_its_doubled_corners_are_gone_is_left_out():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    found = repair(polygons(points, [[0, 1, 2], [0, 1, 1, 2], [2, 2, 0, 1, 1]], None, np.array([0, 1, 2])))
+    assert faces_of(found.mesh) == [[0, 1, 2]]
+    assert found.problems["duplicate_faces"] == 2
+
+
 def test_closed_agrees_with_trimesh():
     ball = trimesh.creation.icosphere(2)
     for faces in (ball.faces, ball.faces[1:], np.concatenate([ball.faces, ball.faces[:1, ::-1]])):
