@@ -31,6 +31,7 @@ from tests.display import ensure_display
 
 PICTURES = Path(__file__).parent / "pictures"
 CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's meshes, CC BY 4.0
+FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"  # the chapter made of its steps stands between
 STYLES = ("short", "fur", "long", "mane")
 
 
@@ -55,9 +56,31 @@ def first_groom() -> None:
     manual.write_text(written(manual.read_text("utf-8")), "utf-8")
 
 
+def first_pose() -> None:
+    """Follow the first corrective by hand; a picture of the window after every step."""
+    ensure_display()  # before anything of Qt is made
+    from app.window.screenshot import window_image
+    from docs.first_pose import SIZE, STEPS, chapter, picture_of
+    from tests.window.alone import hand_at
+    from tests.window.take_pictures import reduced
+
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
+        hand = hand_at(None, SIZE)
+        for number, step in enumerate(STEPS, 1):
+            step.do(hand, Path(folder))
+            image = reduced(window_image(hand.window), 0.75)
+            cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        hand.window.close_unasked()
+    manual = PICTURES.parent / "pose.md"
+    before, _, after = manual.read_text("utf-8").partition(FIRST_POSE[0])
+    manual.write_text(before + FIRST_POSE[0] + chapter() + FIRST_POSE[1] + after.partition(FIRST_POSE[1])[2], "utf-8")
+
+
 def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     first_groom()
+    first_pose()
     evaluator = Evaluator()
     document = demo_document(evaluator)
     children = {1: grow(document.grooms[0], document.meshes[0].mesh, evaluator)}

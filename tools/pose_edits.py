@@ -28,6 +28,7 @@ from core.pose.rig import Rig, all_clips
 from core.pose.synthesis import evaluate
 
 NOTHING = Correctives()
+ROUNDED = 1e-6  # radians and metres: what samples of clips in single precision miss rest by
 Reading = Literal["swing", "twist", "swing-twist", "x", "y", "z"]
 
 
@@ -156,8 +157,15 @@ def set_way(document: Document, mesh_id: int, way: Way) -> Document:
 
 
 def hold_pose(document: Document, mesh_id: int, pose: Pose | None) -> Document:
-    """The document with a mesh held in a pose; None for the clip at the frame again."""
+    """The document with a mesh held in a pose; None for the clip at the frame again.
+
+    Joints that are at rest but for the rounding of a clip's samples are at rest.
+    """
     item, _ = _rigged(document, mesh_id)
+    if pose is not None:
+        pose = pose.replace(
+            rotations={j: q for j, q in pose.rotations.items() if 2.0 * math.hypot(*q[:3]) > ROUNDED},
+            translations={j: t for j, t in pose.translations.items() if math.hypot(*t) > ROUNDED})
     return with_mesh(document, item.replace(pose=pose))
 
 

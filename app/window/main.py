@@ -129,10 +129,10 @@ class MainWindow(QMainWindow):
         made: tuple[tuple[str, QWidget], ...] = (
             ("scene", Section(PANELS["scene"][0], self.outliner, memory, "scene")),
             ("tool", ToolPanel(self.desk, memory)),
-            ("respect", RespectPanel(self.desk, memory)),
             ("controls", Section(PANELS["controls"][0], PoseControls(self.desk), memory, "controls")),
             ("poses", Section(PANELS["poses"][0], PoseList(self.desk), memory, "poses")),
             ("library", Section(PANELS["library"][0], PoseLibrary(self.desk), memory, "library")),
+            ("respect", RespectPanel(self.desk, memory)),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),
             ("history", Section(PANELS["history"][0], HistoryPanel(self.desk), memory, "history")),

@@ -21,6 +21,7 @@ from core.pose.pose_path import Motion, clip_weights, most_moved, walk
 from core.pose.pose_space import PoseSample
 from core.workspace import Workspace
 
+LOW = 480  # pixels of height below which the map stands alone
 NARROW = 760  # pixels of the middle below which map and model stand one over the other
 MOST_FRAMES = 240  # of the graph of a clip
 CLIP, WALK = "clip", "walk"
@@ -41,7 +42,7 @@ class PoseSide(QWidget):
         self.kind = ChoiceBar(_GRAPH, CLIP, CLIP, (CLIP, WALK), ("weights over the clip", "walk to a pose"))
         self.start, self.end = ChoiceBar(_FROM, "rest", "rest", ("rest",)), ChoiceBar(_TO, "", None, ("",))
         self.ways = [Row(_FROM.label, self.start), Row(_TO.label, self.end)]
-        below = QWidget()
+        below = self._below = QWidget()
         column = QVBoxLayout(below)
         column.setContentsMargins(8, 4, 8, 8)
         column.setSpacing(4)
@@ -74,10 +75,16 @@ class PoseSide(QWidget):
         super().showEvent(event)  # type: ignore[arg-type]
         self.refresh()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """The map comes first where there is little room."""
+        super().resizeEvent(event)
+        self._below.setVisible(self.height() >= LOW)
+        self.refresh()
+
     def refresh(self) -> None:
         """Plot what is on the desk now; the work is a job."""
         item = self.desk.posed
-        if self.desk.session.stroking or not self.isVisible():
+        if self.desk.session.stroking or not self.isVisible() or self._below.isHidden():
             return
         samples = _samples(item)
         for row in self.ways:
