@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from core.pose.pose import Pose
+from core.pose.pose import Pose, Vector
 from core.pose.pose_space import Dof, Falloff, PoseSpace
-from core.pose.rotation import faded_twist, rotated_axis
+from core.pose.rotation import swung_and_twisted
 from core.transform import Array
 
 _REST_TURN, _REST_PLACE = (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
@@ -38,10 +38,7 @@ def embed(dofs: Sequence[Dof], poses: Sequence[Pose]) -> Array:
     if turning:
         q = np.array([[pose.rotations.get(d.control, _REST_TURN) for d in turning] for pose in poses], np.float64)
         q = q.reshape(len(poses), len(turning), 4)
-        frames = np.array([(d.axis, d.side, (0.0, 0.0, 0.0)) for d in turning])
-        frames[:, 2] = np.cross(frames[:, 0], frames[:, 1])
-        swung = np.einsum("dij,ndj->ndi", frames, rotated_axis(q, frames[:, 0]))
-        twisted = faded_twist(q, frames[:, 0])
+        swung, twisted = swung_and_twisted(q, np.array([_frame(d.axis, d.side) for d in turning]))
     at = turn = 0
     for dof in dofs:
         if dof.kind == "translation":
@@ -56,6 +53,10 @@ def embed(dofs: Sequence[Dof], poses: Sequence[Pose]) -> Array:
             turn += 1
         at += WIDTHS[dof.kind]
     return out
+
+
+def _frame(a: Vector, b: Vector) -> tuple[Vector, Vector, Vector]:
+    return a, b, (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def scales(

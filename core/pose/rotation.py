@@ -67,12 +67,32 @@ def faded_twist(quaternions: ArrayLike, axes: ArrayLike) -> Array:
     move them, and then shrink by t (3 - t^2) / 2 with t = 2 f: continuous through the pole, where the twist is not.
     """
     q = normalized(quaternions)
-    w = q[..., 3]
-    p = np.sum(q[..., :3] * np.asarray(axes, np.float64), axis=-1)
+    return _faded(q[..., 3], np.sum(q[..., :3] * np.asarray(axes, np.float64), axis=-1))
+
+
+def swung_and_twisted(unit: Array, frames: Array) -> tuple[Array, Array]:
+    """Where the first axis is carried, along the three axes of each frame (..., 3), and :func:`faded_twist` about it.
+
+    Parameters
+    ----------
+    unit : quaternions (..., 4) of length 1. frames : (..., 3, 3), rows are three perpendicular unit axes.
+    """
+    turned = (frames @ unit[..., :3, None])[..., 0]
+    x, y, z, w = turned[..., 0], turned[..., 1], turned[..., 2], unit[..., 3]
+    swung = np.empty(turned.shape)
+    swung[..., 0] = 1.0 - 2.0 * (y * y + z * z)
+    swung[..., 1] = 2.0 * (x * y + z * w)
+    swung[..., 2] = 2.0 * (x * z - y * w)
+    return swung, _faded(w, x)
+
+
+def _faded(w: Array, p: Array) -> Array:
     squared = w * w + p * p
     t = np.minimum(1.0, np.sqrt(squared) / FADE_FROM)
     fade = 0.5 * t * (3.0 - t * t) / np.where(squared > 1e-300, squared, 1.0)
-    return np.stack([fade * (w * w - p * p), fade * 2.0 * w * p], axis=-1)
+    out = np.empty((*squared.shape, 2))
+    out[..., 0], out[..., 1] = fade * (w * w - p * p), fade * 2.0 * w * p
+    return out
 
 
 def quaternion_from_euler(degrees: ArrayLike) -> Array:
