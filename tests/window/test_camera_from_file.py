@@ -54,6 +54,7 @@ def test_several_cameras_are_chosen_from_by_name(hand: Hand, tmp_path: Path) -> 
 
 
 def test_a_file_without_a_camera_is_said_and_the_view_stays(hand: Hand, tmp_path: Path) -> None:
+    hand.rest()  # the first view fits the window once that has its size
     before = hand.window.desk.workspace.cameras
     hand.window.camera_from_file(written(tmp_path / "none.gltf", ()))
     hand.until(lambda: "holds no camera" in hand.window.status.words.text())
