@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QFontMetrics, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
@@ -72,6 +72,12 @@ class StatusLine(QWidget):
         desk.session_replaced.connect(self.show_hint)
         desk.jobs.changed.connect(self._jobs_changed)
         self.show_hint()
+
+    def minimumSizeHint(self) -> QSize:
+        """As high as with a button: the picture above keeps its size when one comes or goes."""
+        margins = self.contentsMargins() + self.layout().contentsMargins()
+        return super().minimumSizeHint().expandedTo(
+            QSize(0, self.copy.sizeHint().height() + margins.top() + margins.bottom()))
 
     def say(self, sentence: str) -> None:
         """Show a sentence for a while."""
