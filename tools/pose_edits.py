@@ -24,7 +24,7 @@ from core.pose.corrective import as_kind
 from core.pose.layers import space_dofs
 from core.pose.pose import SAME, Pose
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, Way
-from core.pose.rig import Rig, all_clips
+from core.pose.rig import Constraint, Rig, all_clips
 from core.pose.synthesis import evaluate
 
 NOTHING = Correctives()
@@ -217,6 +217,15 @@ def play_clip_file(document: Document, mesh_id: int, source: Rig) -> Document:
     last = max(document.last_frame, math.ceil(clip.end))
     changed: Document = with_mesh(document, item.replace(rig=played, pose=None)).replace(last_frame=last)
     return changed
+
+
+def set_constraints(document: Document, mesh_id: int, constraints: Sequence[Constraint]) -> Document:
+    """The document with other constraints of the joints of a rig; poses already made stay as they are."""
+    item, rig = _rigged(document, mesh_id)
+    try:
+        return with_mesh(document, item.replace(rig=rig.replace(constraints=tuple(constraints))))
+    except ValueError as error:
+        raise UserError(f"This cannot be set: {error}.") from error
 
 
 # what these share

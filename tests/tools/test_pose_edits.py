@@ -10,6 +10,7 @@ from core.mesh.mesh import Mesh
 from core.pose.edit_layers import sculpt_errors
 from core.pose.layers import Sculpt, build
 from core.pose.refusal import Refusal
+from core.pose.rig import Constraint
 from core.pose.synthesis import evaluate
 from core.record import freeze
 from tests.core.pose.arms import arm, bumped, turned
@@ -136,6 +137,13 @@ def test_layers_are_switched_named_and_taken_another_way(document):
         edits.rename_layer(document, 1, "fore", "fore+upper")
     mixed = edits.set_way(document, 1, "interpolation")
     assert {layer.kind for layer in find_mesh(mixed, 1).correctives.layers} == {"interpolation"}
+
+
+def test_constraints_belong_to_the_rig(document):
+    limit = Constraint(joint="fore", kind="limit")
+    assert find_mesh(edits.set_constraints(document, 1, [limit]), 1).rig.constraints == (limit,)
+    with pytest.raises(UserError, match="knee"):
+        edits.set_constraints(document, 1, [Constraint(joint="knee", kind="limit")])
 
 
 def test_a_mesh_without_a_rig_is_told():
