@@ -2,7 +2,7 @@
 
 USD and Alembic are read in a bounded child process. Sources: UsdGeomCamera and GfCamera (apertures are measured in the
 unit of the focal length; those of an orthographic camera in tenths of the stage's unit), Alembic's AbcGeom
-CameraSample (apertures in centimetres, focal length in millimetres), glTF 2.0 section 3.10.
+CameraSample (apertures in centimetres, focal length in millimetres), glTF 2.0 sections 3.10 and 3.11.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from core.camera import Camera
 from core.errors import UserError
 from core.formats import alembic_cameras, usd_cameras
 from core.formats.file_space import axis_of, metres_of
-from core.formats.gltf import open_gltf, placed_nodes
+from core.formats.gltf import checked_row, open_gltf, placed_nodes
+from core.formats.gltf_rig import PATHS, GltfFile, sampled
 from core.formats.sandbox import run_bounded
 from core.record import freeze
 
@@ -52,11 +53,12 @@ def read_cameras(
 ) -> tuple[FileCamera, ...]:
     """All cameras of a file in its own order, at a frame.
 
-    A scale of a camera's place in the scene moves it and does nothing else; glTF cameras stand where they rest.
+    A scale of a camera's place in the scene moves it and does nothing else. All animations of a glTF scene
+    move its nodes; where two move the same, the first does.
 
     Parameters
     ----------
-    frame, fps : time codes of USD are frames; Alembic's seconds are frames over `fps`.
+    frame, fps : time codes of USD are frames; seconds of Alembic and glTF are frames over `fps`.
     unit, up : unit (m, cm, mm, in, ft) and up axis (y, z) of a file that does not say; metres and y otherwise.
     sandboxed : run native readers in a child process. False only for files this program has just written.
     cancel : asked now and then while a native reader works.
@@ -73,7 +75,7 @@ def read_cameras(
     if not path.is_file():
         raise UserError(f"{path.name} is not there; give the name of a file.")
     if suffix in GLTF_SUFFIXES:
-        raw = _gltf_cameras(path)
+        raw = _gltf_cameras(path, float(frame) / float(fps))
     else:
         reader = usd_cameras if suffix in USD_SUFFIXES else alembic_cameras
         asked: dict[str, Any] = {"path": str(path.resolve()), "frame": float(frame)}
@@ -125,11 +127,12 @@ def _camera(name: str, world: Array, lens: Array, metres: float, up: str) -> Fil
     return FileCamera(name, camera, half_width / half_height, abs(shift) > 1e-6)
 
 
-def _gltf_cameras(path: Path) -> dict[str, Any]:
-    gltf, _ = open_gltf(path)
+def _gltf_cameras(path: Path, seconds: float) -> dict[str, Any]:
+    gltf, buffers = open_gltf(path)
     names: list[str] = []
     world, lens = [], []
     try:
+        _pose_nodes(GltfFile(path, gltf, buffers), seconds)
         placed = placed_nodes(path, gltf)
         for row, matrix in placed:
             node = gltf.nodes[row]
@@ -154,3 +157,20 @@ def _gltf_cameras(path: Path) -> dict[str, Any]:
         "names": names, "world": np.array(world, np.float64).reshape(-1, 4, 4),
         "lens": np.array(lens, np.float64).reshape(-1, 6), "metres_per_unit": 1.0, "up": "y",
     }
+
+
+def _pose_nodes(file: GltfFile, seconds: float) -> None:
+    """Move the nodes of a scene to where its animations have them at a time."""
+    moved: set[tuple[int, str]] = set()
+    for animation in file.gltf.animations:
+        for channel in animation.channels:
+            row, path = channel.target.node, channel.target.path
+            if row is None or path not in PATHS or (row, path) in moved:
+                continue
+            node, sampler = file.gltf.nodes[checked_row(row)], animation.samplers[checked_row(channel.sampler)]
+            keys = file.numbers(sampler.input, 1)[:, 0]
+            if node.matrix is not None or not len(keys) or not np.isfinite(keys).all() or (np.diff(keys) < 0).any():
+                continue
+            values = sampled(file, sampler, keys, np.array([seconds]), PATHS[path], path == "rotation", 0.0)
+            setattr(node, path, tuple(values[0].tolist()))
+            moved.add((row, path))

@@ -73,7 +73,9 @@ class _Tree(NamedTuple):
     rest: Array
 
 
-class _File(NamedTuple):
+class GltfFile(NamedTuple):
+    """What a file says, and its buffers."""
+
     path: Path
     gltf: Gltf
     buffers: list[bytes]
@@ -91,7 +93,7 @@ def read_raw(path: Path) -> RawRig:
         As for meshes, and for skins or animations that contradict themselves.
     """
     gltf, buffers = open_gltf(path)
-    file = _File(path, gltf, buffers)
+    file = GltfFile(path, gltf, buffers)
     try:
         with np.errstate(all="ignore"):
             return _read(file)
@@ -99,7 +101,7 @@ def read_raw(path: Path) -> RawRig:
         raise UserError(f"{path.name} contradicts itself ({error}); export it again.") from None
 
 
-def _read(file: _File) -> RawRig:
+def _read(file: GltfFile) -> RawRig:
     notes: list[str] = []
     placed = placed_nodes(file.path, file.gltf)
     tree = _tree(file, dict(placed))
@@ -124,7 +126,7 @@ def _read(file: _File) -> RawRig:
     )  # fmt: skip
 
 
-def _tree(file: _File, placed: dict[int, Array]) -> _Tree:
+def _tree(file: GltfFile, placed: dict[int, Array]) -> _Tree:
     gltf = file.gltf
     count = len(gltf.nodes)
     above_node = np.full(count, -1, np.int64)
@@ -190,7 +192,7 @@ def _under(above: Array, upper: float, own: float, local: Array) -> Array:
     return out
 
 
-def _skins(file: _File, tree: _Tree) -> list[tuple[NDArray[np.int64], Array]]:
+def _skins(file: GltfFile, tree: _Tree) -> list[tuple[NDArray[np.int64], Array]]:
     """Per skin its joints (K,) and its inverse bind matrices (K, 4, 4)."""
     skins = []
     for skin in file.gltf.skins:
@@ -208,7 +210,7 @@ def _skins(file: _File, tree: _Tree) -> list[tuple[NDArray[np.int64], Array]]:
 
 
 def _meshes(
-    file: _File, placed: list[tuple[int, Array]], tree: _Tree, skins: list[tuple[NDArray[np.int64], Array]],
+    file: GltfFile, placed: list[tuple[int, Array]], tree: _Tree, skins: list[tuple[NDArray[np.int64], Array]],
     bind: Array, joints: int,
 ) -> tuple[list[RigPiece], dict[str, float], dict[int, list[str]]]:
     """The meshes of the scene, rests of their shapes by name, and the names of the shapes of each node."""
@@ -282,7 +284,7 @@ def _shape_names(extras: Any, count: int, mesh: str, taken: set[str]) -> list[st
 
 
 def _influences(
-    file: _File, primitive: Primitive, table: NDArray[np.int64], count: int
+    file: GltfFile, primitive: Primitive, table: NDArray[np.int64], count: int
 ) -> tuple[NDArray[np.int64], Array]:
     """Joints and weights (V, 4 x sets) of a primitive; -1 for a joint its skin does not have."""
     joints, weights = [], []
@@ -303,7 +305,7 @@ def _influences(
 
 
 def _targets(
-    file: _File, primitive: Primitive, names: list[str], transform: Array, count: int
+    file: GltfFile, primitive: Primitive, names: list[str], transform: Array, count: int
 ) -> dict[str, Targets]:
     found: dict[str, Targets] = {}
     for name, target in zip(names, primitive.targets):
@@ -321,7 +323,7 @@ def _targets(
 
 
 def _clips(
-    file: _File, tree: _Tree, aliases: int, shapes_of_node: dict[int, list[str]], notes: list[str]
+    file: GltfFile, tree: _Tree, aliases: int, shapes_of_node: dict[int, list[str]], notes: list[str]
 ) -> list[RawClip]:
     made: list[RawClip] = []
     for number, animation in enumerate(file.gltf.animations):
@@ -334,7 +336,7 @@ def _clips(
 
 
 def _clip(
-    file: _File, animation: Animation, tree: _Tree, aliases: int, shapes_of_node: dict[int, list[str]], name: str,
+    file: GltfFile, animation: Animation, tree: _Tree, aliases: int, shapes_of_node: dict[int, list[str]], name: str,
     wanted: float | None, notes: list[str],
 ) -> RawClip | None:
     channels = []
@@ -366,7 +368,7 @@ def _clip(
     values: dict[tuple[int, str], Array] = {}
     for node, path, sampler, seconds in channels:
         width = len(shapes_of_node[node]) if path == "weights" else PATHS[path]
-        values[node, path] = _sampled(file, sampler, seconds, at, width, path == "rotation", 0.05 / rate)
+        values[node, path] = sampled(file, sampler, seconds, at, width, path == "rotation", 0.05 / rate)
     t, q, s = (np.zeros((len(frames), joints, width)) for width in (3, 4, 3))
     for j, row in enumerate(tree.nodes):
         mine = [values.get((row, path)) for path in PATHS]
@@ -405,8 +407,8 @@ def _parts(node: Node) -> tuple[Array, Array, Array]:
     return np.array(node.translation), normalized(node.rotation), np.array(node.scale)
 
 
-def _sampled(
-    file: _File, sampler: Sampler, seconds: Array, at: Array, width: int, turns: bool, near: float
+def sampled(
+    file: GltfFile, sampler: Sampler, seconds: Array, at: Array, width: int, turns: bool, near: float
 ) -> Array:
     """Values (F, width) of a sampler at seconds `at` (F,), held outside its keys; keys within `near` are met."""
     cubic = sampler.interpolation == "CUBICSPLINE"

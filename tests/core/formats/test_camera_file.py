@@ -1,5 +1,6 @@
 """Cameras of files: what they see is compared with what the formats' own libraries and specifications say."""
 
+import base64
 import json
 
 import numpy as np
@@ -135,6 +136,39 @@ def test_cameras_of_gltf_stand_where_their_nodes_put_them(tmp_path):
     assert (lens.name, lens.aspect, lens.camera.field_of_view) == ("lens", pytest.approx(2.0), pytest.approx(0.7))
     assert flat.camera.orthographic
     assert (flat.camera.height, flat.aspect) == (pytest.approx(4.0), pytest.approx(1.5))
+
+
+def test_a_camera_of_gltf_is_where_its_animation_has_it_at_the_frame(tmp_path):
+    """The camera moves from x = 0 to 8 in two seconds while the node above turns by a right angle about Y."""
+    half = np.sqrt(0.5)
+    columns = [np.array([0.0, 2.0]), np.array([[0.0, 0, 4], [8, 0, 4]]), np.array([[0.0, 0, 0, 1], [0, half, 0, half]])]
+    data = [column.astype("<f4").tobytes() for column in columns]
+    starts = np.cumsum([0, *map(len, data)]).tolist()
+    path = gltf(
+        tmp_path, [{"type": "perspective", "perspective": {"yfov": 0.7, "aspectRatio": 2.0, "znear": 0.1}}],
+        [{"name": "above", "children": [1]}, {"name": "lens", "camera": 0, "translation": [9, 9, 9]}])
+    said = json.loads(path.read_text())
+    joined = b"".join(data)
+    said |= {
+        "buffers": [{"byteLength": len(joined),
+                     "uri": "data:application/octet-stream;base64," + base64.b64encode(joined).decode()}],
+        "bufferViews": [{"buffer": 0, "byteOffset": start, "byteLength": len(part)}
+                        for start, part in zip(starts, data, strict=False)],
+        "accessors": [{"bufferView": i, "componentType": 5126, "count": 2, "type": kind}
+                      for i, kind in enumerate(("SCALAR", "VEC3", "VEC4"))],
+        "animations": [{
+            "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}},
+                         {"sampler": 1, "target": {"node": 0, "path": "rotation"}}],
+            "samplers": [{"input": 0, "output": 1}, {"input": 0, "output": 2}]}],
+    }
+    path.write_text(json.dumps(said))
+    for frame in (-5, 0, 12, 33, 48, 100):
+        part = min(max(frame / 24.0 / 2.0, 0.0), 1.0)
+        angle = 0.5 * np.pi * part  # of the node above; it takes (x, 0, z) to (x cos + z sin, 0, z cos - x sin)
+        cos, sin = np.cos(angle), np.sin(angle)
+        [found] = read_cameras(path, frame, 24.0)
+        assert np.allclose(found.camera.position, (8 * part * cos + 4 * sin, 0, 4 * cos - 8 * part * sin), atol=1e-5)
+        assert np.allclose(found.camera.forward, (-sin, 0, -cos), atol=1e-5)
 
 
 def test_what_is_no_camera_is_one_sentence(tmp_path):
