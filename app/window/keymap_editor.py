@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSortFilterProxyModel, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QHBoxLayout,
     QHeaderView,
     QLabel,
@@ -23,12 +23,14 @@ from app.window import keymap as keymaps
 from app.window.combo import Combo
 from app.window.commands import Commands, Scope
 from app.window.keymap import Keymap, normal, shown
+from app.window.opening import choose_file
 from app.window.settings import write_whole
 from core.errors import UserError
 
 _MODIFIER_KEYS = {
     Qt.Key.Key_Control, Qt.Key.Key_Shift, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr, Qt.Key.Key_unknown,
     Qt.Key.Key_Super_L, Qt.Key.Key_Super_R}
+KEYMAPS = "Keymaps (*.json)"
 WHERE = {
     "everywhere": "everywhere", "viewport": "over the view", "outliner": "in the scene panel",
     "groom": "over the view, grooming", "pose": "over the view, posing"}
@@ -264,20 +266,16 @@ class KeymapEditor(QDialog):
         self.choose(chosen or "")
 
     def _ask_import(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, "Import hotkeys", "", "Keymaps (*.json)")
-        if path:
-            try:
-                self.import_from(Path(path))
-            except UserError as error:
-                self.failed.emit(error)
+        choose_file(self, "Import hotkeys", [KEYMAPS], lambda path: self._attempt(self.import_from, path))
 
     def _ask_export(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Export hotkeys", "keymap.json", "Keymaps (*.json)")
-        if path:
-            try:
-                self.export_to(Path(path))
-            except UserError as error:
-                self.failed.emit(error)
+        choose_file(self, "Export hotkeys", [KEYMAPS], lambda path: self._attempt(self.export_to, path), ".json")
+
+    def _attempt(self, work: Callable[[Path], object], path: Path) -> None:
+        try:
+            work(path)
+        except UserError as error:
+            self.failed.emit(error)
 
     def _lay_out(self) -> None:
         top, keys, low, layout = QHBoxLayout(), QHBoxLayout(), QHBoxLayout(), QVBoxLayout(self)

@@ -10,7 +10,6 @@ from PySide6.QtCore import QPointF, QRectF, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.window.opening import choose_file
 from app.window.params_panel import make_field
 from app.window.sections import Row
 from app.window.settings import Settings
@@ -166,9 +166,8 @@ class Preferences(QDialog):
         self._change("pen", self._owner.settings.pen.replace(**{name: value}))
 
     def _choose_plugins(self) -> None:
-        folder = QFileDialog.getExistingDirectory(self, "Folder of plug-ins")
-        if folder:
-            self._change("plugin_folder", folder)
+        choose_file(
+            self, "Folder of plug-ins", [], lambda folder: self._change("plugin_folder", str(folder)), folder=True)
 
     def _reset(self) -> None:
         fresh = Settings()
