@@ -22,7 +22,8 @@ run: .venv/ready ## open the window on the demo animal (or FILE=); without a dis
 	else $(PY) -m app demo $(if $(FILE),--mesh "$(FILE)",); fi
 
 test: .venv/ready ## every test, GL through EGL included (under 10 minutes on 2 cores)
-	@$(PY) -m pytest
+	@$(PY) -m app.compile_kernels >/dev/null # once, before the workers would all compile them
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 check: .venv/ready ## ruff, mypy (strict on core and tools), import contracts
 	@$(PY) -m ruff check .
