@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import get_args
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtWidgets import (
     QGridLayout,
     QInputDialog,
@@ -157,7 +157,9 @@ class PoseList(QWidget):
         item = self.desk.posed
         if not self._filling and item is not None and entry.parent() is None:
             on = entry.checkState(0) == Qt.CheckState.Checked
-            self._edit("Show layer" if on else "Hide layer", pose_edits.set_layer_enabled, entry.data(0, _ROLE), on)
+            step, name = "Show layer" if on else "Hide layer", entry.data(0, _ROLE)
+            # after this signal, for the edit fills the list anew, and its row is still at work here
+            QTimer.singleShot(0, self, lambda: self._edit(step, pose_edits.set_layer_enabled, name, on))
 
     def _selected(self) -> None:
         if self._filling:

@@ -130,7 +130,7 @@ def test_the_list_has_the_layers_and_holds_a_pose(posing: Hand) -> None:
     assert layer.space.samples[0].falloffs["wrist"] == (0.5,)
     top = poses.list.topLevelItem(0)
     top.setCheckState(0, Qt.CheckState.Unchecked)
-    assert not desk.document.meshes[0].correctives.layers[0].enabled
+    posing.until(lambda: not desk.document.meshes[0].correctives.layers[0].enabled)
     assert list(desk.session.history.names)[1:] == ["Pose", "Falloff", "Hide layer"]
 
 
