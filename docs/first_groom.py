@@ -153,8 +153,8 @@ def _scatter(hand: Hand, folder: Path) -> None:
 def _length(hand: Hand, folder: Path) -> None:
     hand.key(Qt.Key.Key_L)
     size_of_brush(hand, 50)
-    type_number(hand, ToolPanel, "strength", "0.4")
-    sweep(hand, *NECK)
+    type_number(hand, ToolPanel, "strength", "1")
+    sweep(hand, *NECK[:4], *NECK[2::-1])
     hand.rest()
 
 
@@ -241,8 +241,8 @@ STEPS: tuple[Step, ...] = (
         _scatter, ("Scatter",)),
     Step(
         "Grow it",
-        "**L** takes Length; **F**, `50`, **Return**, and type `0.4` into *Strength*. Drag down the neck once: "
-        "hair grows as long as the ring is over it. With **Ctrl** it shrinks.",
+        "**L** takes Length; **F**, `50`, **Return**, and type `1` into *Strength*. Drag down the neck and up again "
+        "without letting go: every pass makes hair half as long again. With **Ctrl** it shrinks.",
         _length, ("Length",)),
     Step(
         "Comb it",
@@ -252,7 +252,7 @@ STEPS: tuple[Step, ...] = (
     Step(
         "Cut the tips",
         "**K** takes Cut; **F**, `24`, **Return**. Drag along the outer border of the tail: what reaches into the "
-        "ring falls.",
+        "ring falls. Where the ring goes over a root, *Stub* says how much of the hair stays.",
         _cut, ("Cut",)),
     Step(
         "Clone a lock",

@@ -30,6 +30,8 @@ def tools_table(keymaps: list[Keymap]) -> str:
     """Every tool of the house with its keys."""
     rows = [["tool", *(k.name for k in keymaps), "what it does", "the hand"]]
     for tool in Registry(folders=()):
+        if tool.craft != "groom":
+            continue  # each craft has a manual of its own
         keys = [_keys(k.of(f"tool.{tool.name}")) for k in keymaps]
         rows.append([f"**{tool.label}**", *keys, tool.tooltip, re.sub(" {2,}", "; ", tool.hint)])
     return _table(rows)
