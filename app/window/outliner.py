@@ -41,6 +41,7 @@ from tools.document_edits import (
 
 _STAGES = 4  # of dressing a mesh, about
 Index = QModelIndex | QPersistentModelIndex
+MOST_ROWS = 7  # that are shown without scrolling
 
 
 class Rows(QStyledItemDelegate):
@@ -135,12 +136,22 @@ class Outliner(QTreeView):
         desk.workspace_changed.connect(self._workspace_changed)
         desk.stroke_ended.connect(self.refresh)
         desk.session_replaced.connect(self.refresh)
+        for changed in (self.collapsed, self.expanded, self.scene.modelReset, self.scene.rowsInserted,
+                        self.scene.rowsRemoved):
+            changed.connect(self.updateGeometry)
         self.expandAll()
         self._mark_active()
 
     def sizeHint(self) -> QSize:
         look = look_of()
-        return QSize(20 * look.text, 7 * look.row)
+        return QSize(20 * look.text, MOST_ROWS * look.row)
+
+    def minimumSizeHint(self) -> QSize:
+        """Room for the rows there are, up to so many, at the text size of the moment."""
+        index, rows = self.scene.index(0, 0), 0
+        while index.isValid() and rows < MOST_ROWS:
+            index, rows = self.indexBelow(index), rows + 1
+        return QSize(10 * look_of().text, max(rows, 2) * max(self.sizeHintForRow(0), look_of().row) + 4)
 
     def mesh_of(self, item: Item) -> MeshObject:
         """The mesh itself, or the one a groom grows on."""

@@ -14,6 +14,7 @@ from app.window.outliner import Outliner
 from app.window.scene_model import MIME, Item
 from core.document import Document, find_groom, find_mesh
 from tests.documents import grid_mesh, small_document, stroked
+from tests.window.conftest import Opened
 from tools.document_edits import add_empty_groom, add_mesh, set_mesh_locked
 from tools.session import Session
 
@@ -287,3 +288,12 @@ def test_a_thousand_meshes_are_one_list(qtbot: QtBot) -> None:
     assert tree.scene.rowCount() == 1001
     assert resets == []
     desk.session.close(discard=True)
+
+
+@pytest.mark.parametrize("size", [10, 12, 16, 20])
+def test_a_small_scene_needs_no_scrolling_at_any_text_size(opened: Opened, animal: Document, size: int) -> None:
+    hand = opened(animal, text_size=12)
+    hand.window.change_settings(text_size=size)
+    outliner = hand.window.outliner
+    hand.until(lambda: outliner.verticalScrollBar().maximum() == 0, 5_000)
+    hand.window.change_settings(text_size=12)
