@@ -73,8 +73,11 @@ def first_pose() -> None:
             cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
         hand.window.close_unasked()
     manual = PICTURES.parent / "pose.md"
-    before, _, after = manual.read_text("utf-8").partition(FIRST_POSE[0])
-    manual.write_text(before + FIRST_POSE[0] + chapter() + FIRST_POSE[1] + after.partition(FIRST_POSE[1])[2], "utf-8")
+    before, _, rest = manual.read_text("utf-8").partition(FIRST_POSE[0])
+    _, end, after = rest.partition(FIRST_POSE[1])
+    if not end:
+        raise SystemExit(f"pose.md has no line {FIRST_POSE[1]}: put it after the chapter that is to be made")
+    manual.write_text(before + FIRST_POSE[0] + chapter() + FIRST_POSE[1] + after, "utf-8")
 
 
 def main() -> None:

@@ -235,7 +235,7 @@ def test_a_window_of_another_animal_shows_that(opened: Opened, animal: Document)
     hand.window.commands.run("file.new")
     assert hand.window.middle.currentWidget() is hand.window.doors
     hand.window.desk.replace_session(hand.window.make_session(animal))
-    assert hand.window.middle.currentWidget() is hand.window.view
+    assert hand.window.middle.currentWidget() is hand.window.sides
     hand.rest()
     hand.drag(BACK, ASIDE)
     assert names(hand)[-1] == "Comb"
