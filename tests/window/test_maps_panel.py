@@ -100,7 +100,9 @@ def test_the_eye_shows_a_map_on_the_skin(desk: Desk, panel: MapsPanel, qtbot: Qt
 
 def test_delete_takes_the_chosen_map_and_its_overlay(desk: Desk, panel: MapsPanel, qtbot: QtBot) -> None:
     panel.toggle_overlay("density")
+    panel.activateWindow()
     panel.list.setFocus()
+    qtbot.waitUntil(panel.list.hasFocus)  # the window manager gives it, in its own time
     qtbot.keyClick(panel.list, Qt.Key.Key_Delete)
     assert desk.document.grooms[0].maps == ()
     assert desk.document.grooms[0].coat.density_map is None
