@@ -102,9 +102,11 @@ class FrameDecoder:
             selector.register(pipe, selectors.EVENT_READ)
 
             def wait() -> None:
-                while not selector.select(POLL_SECONDS):
+                while True:
                     if cancel is not None and cancel():
                         raise UserError(f"Reading {name} was cancelled.")
+                    if selector.select(POLL_SECONDS):
+                        return
                     if time.monotonic() > deadline:
                         raise UserError(
                             f"{name} took longer than {self._seconds:g} seconds to read; it may be damaged."
