@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from core.record import Record, number
 
 Array = NDArray[np.float64]
-Tangent = Literal["step", "linear", "smooth", "free"]
+Tangent = Literal["step", "linear", "smooth", "free", "aligned"]
+HANDLED = ("free", "aligned")  # tangents that follow the handle of the key
 Extrapolation = Literal["hold", "linear", "cycle"]
 
 MAX_KEYS = 100_000
@@ -24,9 +25,10 @@ class Key(Record):
     frame, value : where it stands.
     arrive, leave : the tangent before and after it. "step" (of `leave`) holds the value until the next key;
         "linear" aims at the neighbour; "smooth" never overshoots (flat at extremes, the monotone slopes of Fritsch
-        and Carlson, SIAM J. Numer. Anal. 1980, in Butland's form); "free" follows the handle.
-    arrive_handle, leave_handle : (frames, value) from the key to its Bezier handle, of "free" tangents; frames <= 0
-        before the key, >= 0 after it. A handle that reaches past the neighbouring key is shortened to it.
+        and Carlson, SIAM J. Numer. Anal. 1980, in Butland's form); "free" follows the handle, and so does
+        "aligned", whose two handles a hand turns as one (core/curve_edit.py).
+    arrive_handle, leave_handle : (frames, value) from the key to its Bezier handle, of "free" and "aligned" tangents;
+        frames <= 0 before the key, >= 0 after it. A handle that reaches past the neighbouring key is shortened to it.
     """
 
     frame: float
@@ -70,7 +72,7 @@ def curve_at(curve: Curve, frames: ArrayLike) -> Array:
     f = np.asarray(frames, np.float64)
     if len(curve.keys) == 1:
         return np.full(f.shape, curve.keys[0].value)
-    x, y = _control_points(curve)
+    x, y = control_points(curve)
     first, last = x[0, 0], x[-1, 3]
     early, late = f < first, f > last
     inside = np.clip(f, first, last)
@@ -124,7 +126,7 @@ def _parameter(x: Array, frames: Array) -> Array:
     return s
 
 
-def _control_points(curve: Curve) -> tuple[Array, Array]:
+def control_points(curve: Curve) -> tuple[Array, Array]:
     """Frames and values (K - 1, 4) of the Bezier control points of every segment."""
     keys = curve.keys
     f = np.array([key.frame for key in keys])
@@ -136,12 +138,12 @@ def _control_points(curve: Curve) -> tuple[Array, Array]:
     for i, (a, b) in enumerate(itertools.pairwise(keys)):
         if a.leave == "smooth":
             y[i, 1] = v[i] + smooth[i] * length[i] / 3.0
-        elif a.leave == "free":
+        elif a.leave in HANDLED:
             scale = _shorten(a.leave_handle[0], length[i])
             x[i, 1], y[i, 1] = f[i] + a.leave_handle[0] * scale, v[i] + a.leave_handle[1] * scale
         if b.arrive == "smooth":
             y[i, 2] = v[i + 1] - smooth[i + 1] * length[i] / 3.0
-        elif b.arrive == "free":
+        elif b.arrive in HANDLED:
             scale = _shorten(-b.arrive_handle[0], length[i])
             x[i, 2], y[i, 2] = f[i + 1] + b.arrive_handle[0] * scale, v[i + 1] + b.arrive_handle[1] * scale
     return x, np.clip(y, -1e30, 1e30)

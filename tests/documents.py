@@ -73,7 +73,11 @@ def animated_document() -> Document:
     """The small document with a coat whose values are of every kind: what the baselines of the formats hold."""
     document = small_document()
     groom = document.grooms[0]
-    keys = (Key(frame=1001.0, value=0.1), Key(frame=1010.0, value=0.6, leave="free", leave_handle=(2.0, 0.1)))
+    keys = (
+        Key(frame=1001.0, value=0.1), Key(frame=1010.0, value=0.6, leave="free", leave_handle=(2.0, 0.1)),
+        Key(frame=1030.0, value=0.2, arrive="aligned", leave="aligned", arrive_handle=(-3.0, 0.1),
+            leave_handle=(3.0, -0.1)),
+    )
     coat = groom.coat.replace(
         density=formula("clamp(0.5 + u, 0, 1)"), length=constant(1.25, "density"), clump=Value(base=Curve(keys=keys)),
         frizz=Value(base=Curve(keys=keys, before="cycle", after="linear"), map="density"),

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from core.curve import Curve
 from core.document import Document
-from core.groom.groom import COAT_VALUES
 from core.posed import moves
+from tools.keyed import keyed_values
 
 
 def keyed_frames(document: Document) -> tuple[float, ...]:
-    """Frames at which a number of any coat has a key, ascending, each once."""
-    frames = {
-        key.frame
-        for groom in document.grooms for name in COAT_VALUES
-        if isinstance(base := getattr(groom.coat, name).base, Curve) for key in base.keys
-    }
-    return tuple(sorted(frames))
+    """Frames at which any value has a key, ascending, each once."""
+    return tuple(sorted({key.frame for keyed in keyed_values(document) for key in keyed.curve.keys}))
 
 
 def clip_range(document: Document) -> tuple[float, float] | None:

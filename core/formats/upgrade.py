@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 3
+FORMAT = 4
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -40,8 +40,13 @@ def held_poses(raw: Raw) -> Raw:
     return raw
 
 
+def aligned_handles(raw: Raw) -> Raw:
+    """3 -> 4: tangents of keys may be "aligned"; as none were, nothing is to be changed."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
-UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values, 2: held_poses}
+UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values, 2: held_poses, 3: aligned_handles}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:
