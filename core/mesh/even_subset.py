@@ -16,6 +16,7 @@ from core.mesh.scatter_kernels import (
     NEVER,
     OCTAVES,
     SHRINK,
+    arriving,
     fill_buckets,
     find_buckets,
     test_candidates,
@@ -74,11 +75,9 @@ def even_subset(
                 break
             begin, end = end, int(ends[batch])
             batch += 1
-            newcomers = begin + np.flatnonzero(candidates.stretch[begin:end] > 0.0)
-            darts.wake[newcomers] = level
-            darts.active[found : found + len(newcomers)] = newcomers
-            found += len(newcomers)
-            seen += len(newcomers)
+            before = found
+            found = arriving(candidates.stretch, begin, end, level, darts.wake, darts.active, found)
+            seen += found - before
         darts.throw(woken, found, level, _last_level(level, darts.accepted, count))
     n = darts.accepted
     return Subset(darts.chosen[:n].copy(), darts.levels[:n].copy(), dry)

@@ -162,6 +162,16 @@ def fill_buckets(roots, faces, buckets, count, start, stop, firsts, grid, grid_f
 
 
 @njit(cache=True, inline="always")
+def _none_within(roots, start, stop, x, y, z, limit):  # type: ignore[no-untyped-def]
+    """Whether no root of these rows is nearer than the root of `limit`; counted, so that eight are done at a time."""
+    found = np.int32(0)
+    for row in range(np.uintp(start), np.uintp(stop)):
+        dx, dy, dz = roots[row, 0] - x, roots[row, 1] - y, roots[row, 2] - z
+        found += np.int32(dx * dx + dy * dy + dz * dz < limit)
+    return found == 0
+
+
+@njit(cache=True, inline="always")
 def _wake(near, size, level):  # type: ignore[no-untyped-def]
     """The level at which the radius has become smaller than the distance whose square is `near`."""
     if near <= 0.0:
@@ -180,6 +190,21 @@ def waking(wake, end, level, active):  # type: ignore[no-untyped-def]
     for c in range(end):
         active[found] = c
         found += wake[c] == level
+    return found
+
+
+@njit(
+    types.int64(F32_1D, types.int64, types.int64, types.int64, types.uint16[::1], types.int32[::1], types.int64),
+    cache=True, nogil=True, error_model="numpy",
+)
+def arriving(stretch, begin, end, level, wake, active, found):  # type: ignore[no-untyped-def]
+    """Append candidates begin .. end, but those that are none, to the `found` active ones, to be tested at `level`;
+    returns how many are active now."""
+    for c in range(begin, end):
+        active[found] = c
+        if stretch[c] > 0.0:
+            wake[c] = level
+            found += 1
     return found
 
 
@@ -231,9 +256,10 @@ def test_candidates(  # type: ignore[no-untyped-def]
             dj = -1 if fy < edge else (1 if fy > 1.0 - edge else 0)
             dk = -1 if fz < edge else (1 if fz > 1.0 - edge else 0)
             # squares of the distances to those sides
-            sx = (fx if di < 0 else 1.0 - fx) ** 2 / (scale * scale)
-            sy = (fy if dj < 0 else 1.0 - fy) ** 2 / (scale * scale)
-            sz = (fz if dk < 0 else 1.0 - fz) ** 2 / (scale * scale)
+            side = np.float64(cell * (1 << octave))
+            sx = ((fx if di < 0 else 1.0 - fx) * side) ** 2
+            sy = ((fy if dj < 0 else 1.0 - fy) * side) ** 2
+            sz = ((fz if dk < 0 else 1.0 - fz) * side) ** 2
             widest = min(own, np.float32(1 << octave)) ** 2
             for corner in range(8):
                 if (corner & 1 and di == 0) or (corner & 2 and dj == 0) or (corner & 4 and dk == 0):
@@ -244,6 +270,8 @@ def test_candidates(  # type: ignore[no-untyped-def]
                 i, j, k = i0 + di * (corner & 1), j0 + dj * (corner >> 1 & 1), k0 + dk * (corner >> 2)
                 b = np.uintp(_bucket(octave, i, j, k, mask))
                 row, end = firsts[b], np.int32(-1) if accepting else firsts[b + np.uintp(1)]
+                if not accepting and _none_within(roots, row, end, x, y, z, best * widest):
+                    continue
                 while row != end:
                     r = np.uintp(row)
                     dx, dy, dz = roots[r, 0] - x, roots[r, 1] - y, roots[r, 2] - z
@@ -260,9 +288,11 @@ def test_candidates(  # type: ignore[no-untyped-def]
                             )
                         if facing > SAME_SIDE:
                             best = d2 / both
+                            if best < enough:
+                                break  # it sleeps long anyway; waking a little early does no harm
                     row = links[r] if accepting else row + np.int32(1)
                 if best < enough:
-                    break  # it sleeps long anyway; waking a little early does no harm
+                    break
         if best < limit:
             wake[c] = _wake(best, size, level)
         elif accepting:
