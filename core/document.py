@@ -10,7 +10,8 @@ from core.errors import UserError
 from core.field import field
 from core.groom.groom import Groom
 from core.image.plate import Plate
-from core.match.track import Track
+from core.match.outline import Mask
+from core.match.track import PlaneTrack, Track
 from core.mesh.mesh import Mesh
 from core.pose.pose import Pose
 from core.pose.pose_space import Correctives
@@ -72,7 +73,8 @@ class MeshObject(Record):
 class Document(Record):
     """Everything undo brings back.
 
-    meshes, grooms, plates, tracks : each with ids unique among their kind. A track is of a plate.
+    meshes, grooms, plates, tracks, planes, masks : each with ids unique among their kind; the last three are of a
+        plate.
     """
 
     unit: Annotated[str, field(
@@ -95,6 +97,8 @@ class Document(Record):
     grooms: tuple[Groom, ...] = ()
     plates: tuple[Plate, ...] = ()
     tracks: tuple[Track, ...] = ()
+    planes: tuple[PlaneTrack, ...] = ()
+    masks: tuple[Mask, ...] = ()
 
     def __post_init__(self) -> None:
         if self.unit not in METRES_PER_UNIT:
@@ -107,11 +111,15 @@ class Document(Record):
         if len(mesh_ids) != len(self.meshes) or len({g.id for g in self.grooms}) != len(self.grooms):
             raise ValueError("Document holds two things of the same id")
         plate_ids = {plate.id for plate in self.plates}
-        if len(plate_ids) != len(self.plates) or len({track.id for track in self.tracks}) != len(self.tracks):
-            raise ValueError("Document holds two plates or two tracks of the same id")
-        for track in self.tracks:
-            if track.plate_id not in plate_ids:
-                raise ValueError(f"Document.tracks: the plate {track.plate_id} of track {track.name!r} does not exist")
+        if len(plate_ids) != len(self.plates):
+            raise ValueError("Document holds two plates of the same id")
+        for kind in ("tracks", "planes", "masks"):
+            items = getattr(self, kind)
+            if len({item.id for item in items}) != len(items):
+                raise ValueError(f"Document.{kind} holds two of the same id")
+            for item in items:
+                if item.plate_id not in plate_ids:
+                    raise ValueError(f"Document.{kind}: the plate {item.plate_id} of {item.name!r} does not exist")
         for groom in self.grooms:
             if groom.mesh_id not in mesh_ids:
                 raise ValueError(f"Document.grooms: the mesh {groom.mesh_id} of groom {groom.name!r} does not exist")

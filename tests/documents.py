@@ -11,6 +11,9 @@ from core.curve import Curve, Key
 from core.document import Document, MeshObject, with_groom
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
+from core.image.plate import Plate
+from core.match.outline import Mask
+from core.match.track import TrackSettings, drawn_plane, keyed_track
 from core.mesh.mesh import Mesh
 from core.mesh.roots import Roots
 from core.record import freeze
@@ -83,7 +86,20 @@ def animated_document() -> Document:
         frizz=Value(base=Curve(keys=keys, before="cycle", after="linear"), map="density"),
         width_root=formula("1e-4 * (1 + rand(id, 7))", "density"), length_variation=constant(0.3),
     )
-    return with_groom(document, groom.replace(coat=coat))
+    return matched(with_groom(document, groom.replace(coat=coat)))
+
+
+def matched(document: Document) -> Document:
+    """The document with a plate, and a track, a plane and a mask on it."""
+    square = np.array([[10.0, 10.0], [50.0, 12.0], [48.0, 40.0], [9.0, 38.0]])
+    track = keyed_track(1, "nose", np.array([[1001.0, 20.5, 30.25], [1010.0, 22.0, 31.0]]), 1)
+    return document.replace(  # type: ignore[no-any-return]
+        plates=(Plate(id=1, name="shot", path="plates/shot.####.exr", first=1001, last=1020, width=64, height=48),),
+        tracks=(track.replace(settings=TrackSettings(pattern=31), offset=(4.0, -2.0), shape=square - 25.0),),
+        planes=(drawn_plane(1, "wall", 1001, square, 1),),
+        masks=(Mask(id=1, name="hand", frames=np.array([1001, 1010], np.int32), points=np.stack((square, square + 3)),
+                    plate_id=1, smooth=True),),
+    )  # fmt: skip
 
 
 def stroked(document: Document, seed: int, share: float = 0.3) -> Document:

@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 4
+FORMAT = 5
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -45,8 +45,13 @@ def aligned_handles(raw: Raw) -> Raw:
     return raw
 
 
+def shaped_tracks(raw: Raw) -> Raw:
+    """4 -> 5: planes, masks, and tracks with a shape, an offset and settings of their own; as none were, nothing is."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
-UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values, 2: held_poses, 3: aligned_handles}
+UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:

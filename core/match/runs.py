@@ -87,7 +87,7 @@ class Runs:
         self._hold = NO_HOLD if hold is None else np.ascontiguousarray(hold)
         first, count = len(self.alive), len(points)
         rows = np.arange(first, first + count)
-        self.templates = Templates(*(np.concatenate(pair) for pair in zip(self.templates, made, strict=True)))
+        self.templates = self.templates.with_more(made)
         self.coefficients = self.templates.coefficients
         warp = np.zeros((count, 8))
         warp[:, :2] = points

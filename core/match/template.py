@@ -32,6 +32,15 @@ class Templates(NamedTuple):
     centre: NDArray[np.float64]
     noise: NDArray[np.float64]
 
+    def with_more(self, more: Templates) -> Templates:
+        """These and then those of `more`."""
+        return Templates(
+            np.concatenate((self.coefficients, more.coefficients)),
+            np.concatenate((self.keep, more.keep)),
+            np.concatenate((self.centre, more.centre)),
+            np.concatenate((self.noise, more.noise)),
+        )
+
 
 def cut_templates(
     image: NDArray[np.float32],

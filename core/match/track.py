@@ -1,4 +1,4 @@
-"""Records of 2D tracks: one point of the scene, seen in a plate frame by frame."""
+"""Records of 2D tracks: one point of the scene, or one flat piece of it, seen in a plate frame by frame."""
 
 from __future__ import annotations
 
@@ -96,6 +96,9 @@ class TrackSettings(Record):
             raise ValueError(f"TrackSettings.model must be auto or one of {', '.join(MODELS)}, not {self.model!r}")
 
 
+FARTHEST = 1e5  # pixels from a point to its pattern
+
+
 class Track(Record):
     """One point through a plate. Pixels, centres at whole numbers, origin top left, y down; frames as files count them.
 
@@ -107,6 +110,10 @@ class Track(Record):
     own : (F, 3) float64, of the frame's own error: independent from frame to frame. What all frames share, the noise
         in the template, stands on the frame of the key instead, so a solver takes these as they are.
     score : (F,) float64, 0 to 1, likeness to the template.
+    settings : how this one is followed, or None for the settings of whoever follows it.
+    offset : pixels from the point to the middle of its pattern at the key, for a point that is hard to see itself.
+    shape : (P, 2) float64, the closed outline of the pattern around its middle, or None for the whole square;
+        shape_smooth makes it a curve.
     """
 
     id: int
@@ -118,12 +125,21 @@ class Track(Record):
     own: np.ndarray
     score: np.ndarray
     plate_id: int = 0
+    settings: TrackSettings | None = None
+    offset: tuple[float, float] = (0.0, 0.0)
+    shape: np.ndarray | None = None
+    shape_smooth: bool = False
     hidden: bool = False
     locked: bool = False
 
     def __post_init__(self) -> None:
         text(self, "name")
         number(self, "id", "plate_id", least=0, most=2**31 - 1)
+        number(self, "offset", least=-FARTHEST, most=FARTHEST)
+        if self.shape is not None:
+            column(self, "shape", np.float64, (None, 2))
+            if len(self.shape) < 3 or np.abs(self.shape).max() > FARTHEST:
+                raise ValueError(f"Track.shape must have 3 points or more, none {FARTHEST:g} pixels away")
         column(self, "keys", np.float64, (None, 3))
         column(self, "frames", np.int32, (None,))
         count = len(self.frames)
@@ -155,3 +171,78 @@ def keyed_track(track_id: int, name: str, keys: NDArray[np.float64], plate_id: i
         score=np.ones(len(keys)),
         plate_id=plate_id,
     )
+
+
+class PlaneTrack(Record):
+    """A flat piece of the scene through a plate, each frame as a whole: a corner pin. Pixels and frames as of a track.
+
+    key_frame : where it was drawn. outline : (P, 2) float64, P >= 3, the closed shape that is followed, at the key;
+        smooth makes it a curve. corners : (4, 2) float64, what is pinned, at the key.
+    frames : (F,) int32 rising; where it was seen, the key among them once it was followed.
+    homographies : (F, 3, 3) float64, pixels of the frame from pixels of the key.
+    error : (F,) float64, pixels, standard deviation foretold of a corner of the box around the outline, the worst one.
+    score : (F,) float64, 0 to 1, likeness to the key.
+    """
+
+    id: int
+    name: str
+    key_frame: int
+    outline: np.ndarray
+    corners: np.ndarray
+    frames: np.ndarray
+    homographies: np.ndarray
+    error: np.ndarray
+    score: np.ndarray
+    plate_id: int = 0
+    smooth: bool = False
+    settings: TrackSettings | None = None
+    hidden: bool = False
+    locked: bool = False
+
+    def __post_init__(self) -> None:
+        text(self, "name")
+        number(self, "id", "plate_id", least=0, most=2**31 - 1)
+        number(self, "key_frame", least=-(2**31), most=2**31 - 1)
+        column(self, "outline", np.float64, (None, 2))
+        if len(self.outline) < 3:
+            raise ValueError("PlaneTrack.outline must have 3 points or more")
+        column(self, "corners", np.float64, (4, 2))
+        column(self, "frames", np.int32, (None,))
+        count = len(self.frames)
+        column(self, "homographies", np.float64, (count, 3, 3))
+        column(self, "error", np.float64, (count,))
+        column(self, "score", np.float64, (count,))
+        if (np.diff(self.frames) <= 0).any():
+            raise ValueError("PlaneTrack.frames must rise from frame to frame")
+
+
+def drawn_plane(
+    plane_id: int, name: str, frame: int, outline: NDArray[np.float64], plate_id: int = 0, *, smooth: bool = False
+) -> PlaneTrack:
+    """A plane that has only its outline (P, 2) at a frame. Four points are the corners, else their upright box is."""
+    outline = np.ascontiguousarray(outline, np.float64)
+    (left, top), (right, bottom) = outline.min(axis=0), outline.max(axis=0)
+    box = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    return PlaneTrack(
+        id=plane_id,
+        name=name,
+        key_frame=frame,
+        outline=outline,
+        corners=outline if len(outline) == 4 else box,
+        frames=np.array([frame], np.int32),
+        homographies=np.eye(3)[None],
+        error=np.zeros(1),
+        score=np.ones(1),
+        plate_id=plate_id,
+        smooth=smooth,
+    )
+
+
+def carried_points(plane: PlaneTrack, frame: int, points: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Where points (N, 2) of the key lie in a frame, on the plane; None where the plane is not seen."""
+    at = int(np.searchsorted(plane.frames, frame))
+    if at == len(plane.frames) or plane.frames[at] != frame:
+        return None
+    matrix = plane.homographies[at]
+    there = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(there[:, :2] / there[:, 2:])
