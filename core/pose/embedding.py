@@ -20,6 +20,7 @@ from core.transform import Array
 
 _REST_TURN, _REST_PLACE = (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 WIDTHS = {"swing": 3, "twist": 2, "swing-twist": 5, "translation": 3, "number": 1}  # coordinates of a kind
+READ = {"swing": slice(0, 3), "twist": slice(3, 5), "swing-twist": slice(0, 5)}  # of ``swung_and_twisted``
 
 
 def chord(angle: float) -> float:
@@ -37,8 +38,8 @@ def embed(dofs: Sequence[Dof], poses: Sequence[Pose]) -> Array:
     turning = [d for d in dofs if d.kind in ("swing", "twist", "swing-twist")]
     if turning:
         q = np.array([[pose.rotations.get(d.control, _REST_TURN) for d in turning] for pose in poses], np.float64)
-        q = q.reshape(len(poses), len(turning), 4)
-        swung, twisted = swung_and_twisted(q, np.array([_frame(d.axis, d.side) for d in turning]))
+        frames = np.array([_frame(d.axis, d.side) for d in turning], np.float64)
+        turned = swung_and_twisted(q.reshape(len(poses), len(turning), 4), frames)
     at = turn = 0
     for dof in dofs:
         if dof.kind == "translation":
@@ -46,10 +47,7 @@ def embed(dofs: Sequence[Dof], poses: Sequence[Pose]) -> Array:
         elif dof.kind == "number":
             out[:, at] = [pose.numbers.get(dof.control, dof.rest) for pose in poses]
         else:
-            if dof.kind != "twist":
-                out[:, at : at + 3] = swung[:, turn]
-            if dof.kind != "swing":
-                out[:, at + WIDTHS[dof.kind] - 2 : at + WIDTHS[dof.kind]] = twisted[:, turn]
+            out[:, at : at + WIDTHS[dof.kind]] = turned[:, turn, READ[dof.kind]]
             turn += 1
         at += WIDTHS[dof.kind]
     return out

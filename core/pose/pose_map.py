@@ -12,11 +12,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from core.pose.embedding import WIDTHS, embed, scales
+from core.pose.embedding import READ, WIDTHS, embed, scales
 from core.pose.pose import REST, Pose, Quaternion
 from core.pose.pose_space import Dof, PoseSpace
 from core.pose.refusal import Refusal
-from core.pose.rotation import faded_twist, rotated_axis, twist_angle
+from core.pose.rotation import rotated_axis, swung_and_twisted, twist_angle
 from core.pose.solve import solve, weights_at
 from core.transform import Array, quaternion_about, quaternion_product, slerp
 
@@ -119,11 +119,8 @@ def embed_plane(dofs: Sequence[Dof], axes: tuple[Axis, Axis], pose: Pose, plane:
                 else:
                     lean[:, 0 if axis.part == "lean" else 1] = values
             turns = _turns(lean, twist, about)
-            if dof.kind != "twist":
-                frame = np.array([dof.axis, dof.side, np.cross(dof.axis, dof.side)])
-                block[:, :3] = rotated_axis(turns, np.array(dof.axis)[None]) @ frame.T
-            if dof.kind != "swing":
-                block[:, width - 2 :] = faded_twist(turns, np.array(dof.axis)[None])
+            frame = np.array([[dof.axis, dof.side, np.cross(dof.axis, dof.side)]])
+            block[:] = swung_and_twisted(turns[:, None], frame)[:, 0, READ[dof.kind]]
         column += width
     return np.asarray(out, np.float64)
 

@@ -7,7 +7,11 @@ squared cosine of half the swing angle; where it vanishes (a swing of 180 degree
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
+from numba.core.types import float64, void
 from numpy.typing import ArrayLike, NDArray
 
 from core.transform import Array, matrix_from_quaternion, normalized, quaternion_about, quaternion_product
@@ -60,39 +64,42 @@ def swing_angle(quaternions: ArrayLike, axes: ArrayLike) -> Array:
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
 
 
-def faded_twist(quaternions: ArrayLike, axes: ArrayLike) -> Array:
-    """Cosine and sine of the twist (..., 2), faded to (0, 0) where the swing nears 180 degrees.
+def swung_and_twisted(unit: Array, frames: Array) -> Array:
+    """Where joints are swung and twisted to, five numbers that move steadily with the rotation.
 
-    With f = sqrt(w^2 + (v.a)^2) they are whole up to a swing of 120 degrees (f >= 1/2), so that swing alone does not
-    move them, and then shrink by t (3 - t^2) / 2 with t = 2 f: continuous through the pole, where the twist is not.
-    """
-    q = normalized(quaternions)
-    return _faded(q[..., 3], np.sum(q[..., :3] * np.asarray(axes, np.float64), axis=-1))
-
-
-def swung_and_twisted(unit: Array, frames: Array) -> tuple[Array, Array]:
-    """Where the first axis is carried, along the three axes of each frame (..., 3), and :func:`faded_twist` about it.
+    The first axis of a frame as it is carried, along the three axes of the frame; then cosine and sine of the twist
+    about it, faded to (0, 0) where the swing nears 180 degrees: with f = sqrt(w^2 + (v.a)^2) they are whole up to a
+    swing of 120 degrees (f >= 1/2), so that swing alone does not move them, and then shrink by t (3 - t^2) / 2 with
+    t = 2 f: continuous through the pole, where the twist is not.
 
     Parameters
     ----------
-    unit : quaternions (..., 4) of length 1. frames : (..., 3, 3), rows are three perpendicular unit axes.
+    unit : (N, T, 4) quaternions of length 1. frames : (T, 3, 3), rows are three perpendicular unit axes.
+
+    Returns
+    -------
+    (N, T, 5) float64.
     """
-    turned = (frames @ unit[..., :3, None])[..., 0]
-    x, y, z, w = turned[..., 0], turned[..., 1], turned[..., 2], unit[..., 3]
-    swung = np.empty(turned.shape)
-    swung[..., 0] = 1.0 - 2.0 * (y * y + z * z)
-    swung[..., 1] = 2.0 * (x * y + z * w)
-    swung[..., 2] = 2.0 * (x * z - y * w)
-    return swung, _faded(w, x)
-
-
-def _faded(w: Array, p: Array) -> Array:
-    squared = w * w + p * p
-    t = np.minimum(1.0, np.sqrt(squared) / FADE_FROM)
-    fade = 0.5 * t * (3.0 - t * t) / np.where(squared > 1e-300, squared, 1.0)
-    out = np.empty((*squared.shape, 2))
-    out[..., 0], out[..., 1] = fade * (w * w - p * p), fade * 2.0 * w * p
+    out = np.empty((*unit.shape[:2], 5))
+    _swing_and_twist(np.ascontiguousarray(unit, np.float64), np.ascontiguousarray(frames, np.float64), out)
     return out
+
+
+@njit(void(float64[:, :, ::1], float64[:, :, ::1], float64[:, :, ::1]), cache=True, nogil=True)
+def _swing_and_twist(unit: np.ndarray, frames: np.ndarray, out: np.ndarray) -> None:
+    for n in range(unit.shape[0]):
+        for t in range(unit.shape[1]):
+            q, frame, o, w = unit[n, t], frames[t], out[n, t], unit[n, t, 3]
+            x = frame[0, 0] * q[0] + frame[0, 1] * q[1] + frame[0, 2] * q[2]
+            y = frame[1, 0] * q[0] + frame[1, 1] * q[1] + frame[1, 2] * q[2]
+            z = frame[2, 0] * q[0] + frame[2, 1] * q[1] + frame[2, 2] * q[2]
+            o[0] = 1.0 - 2.0 * (y * y + z * z)
+            o[1] = 2.0 * (x * y + z * w)
+            o[2] = 2.0 * (x * z - y * w)
+            squared = w * w + x * x
+            part = min(1.0, math.sqrt(squared) / FADE_FROM)
+            fade = 0.5 * part * (3.0 - part * part) / max(squared, 1e-300)
+            o[3], o[4] = fade * (w * w - x * x), fade * 2.0 * w * x
 
 
 def quaternion_from_euler(degrees: ArrayLike) -> Array:

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
+from numba.core.types import float64, void
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotri
-from scipy.spatial.distance import cdist
 
 from core.pose.embedding import WIDTHS, embed, scales
 from core.pose.kernels import AFFINE, POSITIVE, inverse_squares, kernel
@@ -116,7 +116,7 @@ def solve_centres(
     system = _system(matrix, centres, plane, settings.smoothing)
     if not symmetric:
         _refuse_turned(matrix, system, centres, usual, phi, plane, settings, names)
-    inverse, least = _inverse(system, names, symmetric and plane is None and settings.kernel in POSITIVE)
+    inverse, least = _inverse(system, names)
     if symmetric and settings.table and settings.kernel in POSITIVE and np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise Refusal("singular", names, "the table of the kernel is too coarse for them; give it more entries")
     inverse = inverse[:, :count]
@@ -152,11 +152,21 @@ def weights_at(solved: Solved, places: Array) -> Array:
 
 def _squared_distances(places: Array, centres: Array, each: Array) -> Array:
     """(N, C), each centre measuring with its own scales."""
-    if (each == each[:1]).all():
-        found: Array = cdist(places * each[0], centres * each[0], "sqeuclidean")
-        return found
-    apart = (places[:, None, :] - centres[None, :, :]) * each[None, :, :]
-    return np.einsum("ncd,ncd->nc", apart, apart)
+    out = np.empty((len(places), len(centres)))
+    p, c, e = (np.ascontiguousarray(a, np.float64) for a in (places, centres, each))
+    _measure(p, c, e, out)
+    return out
+
+
+@njit(void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1]), cache=True, nogil=True)
+def _measure(places: np.ndarray, centres: np.ndarray, each: np.ndarray, out: np.ndarray) -> None:
+    for n in range(len(places)):
+        for c in range(len(centres)):
+            total = 0.0
+            for d in range(centres.shape[1]):
+                apart = (places[n, d] - centres[c, d]) * each[c, d]
+                total += apart * apart
+            out[n, c] = total
 
 
 def _columns(places: Array, centres: Array, each: Array, phi: Callable[[Array], Array], plane: Plane | None) -> Array:
@@ -181,15 +191,15 @@ def _system(matrix: Array, centres: Array, plane: Plane | None, smoothing: float
     return system
 
 
-def _inverse(system: Array, names: tuple[str, ...], positive: bool) -> tuple[Array, float]:
+def _inverse(system: Array, names: tuple[str, ...]) -> tuple[Array, float]:
     """The inverse and a reciprocal condition; Refusal when that of the singular values is below the least.
 
     The condition by sums of columns bounds it within the size of the system, so singular values, many times slower,
     are only sought where the bound leaves a doubt.
     """
     try:
-        quick = _inverse_of_positive(system) if positive else None
-        inverse: Array = np.asarray(np.linalg.inv(system), np.float64) if quick is None else quick
+        # numpy's alone: two linear algebra libraries, each with its threads, wait for each other
+        inverse: Array = np.asarray(np.linalg.inv(system), np.float64)
         least = 1.0 / float(np.abs(system).sum(axis=0).max() * np.abs(inverse).sum(axis=0).max() * len(system))
     except np.linalg.LinAlgError:
         least = 0.0
@@ -199,16 +209,6 @@ def _inverse(system: Array, names: tuple[str, ...], positive: bool) -> tuple[Arr
     if not least >= LEAST_CONDITION:
         raise Refusal("singular", _guilty(share, names))
     return inverse, least
-
-
-def _inverse_of_positive(system: Array) -> Array | None:
-    """By Cholesky's factors, in half the time; None where rounding has left it not positive definite."""
-    factor, fault = dpotrf(system, lower=1)
-    if fault:
-        return None
-    lower = dpotri(factor, lower=1)[0]
-    whole: Array = np.tril(lower) + np.tril(lower, -1).T
-    return whole
 
 
 def _weakest(system: Array, names: tuple[str, ...]) -> tuple[float, Array]:

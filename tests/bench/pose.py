@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -29,9 +33,17 @@ TITLE = "Pose space"
 
 def run() -> list[Row]:
     workers = Workers(2)
-    rows = [*_fit(), *_synthesis(), *_whole_mesh(workers), *_adding()]
+    rows = [*_on_one_thread(), *_whole_mesh(workers), *_adding()]
     workers.close()
     return rows
+
+
+def _on_one_thread() -> list[Row]:
+    """What is compared with other libraries, in a process whose BLAS has no threads that keep a core busy after use."""
+    made = subprocess.run(
+        [sys.executable, "-m", "tests.bench.pose"], env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}, check=True,
+        stdout=subprocess.PIPE, timeout=600)
+    return [Row(*row) for row in json.loads(made.stdout)]
 
 
 def _poses(count: int, joints: int, seed: int = 0) -> list[Pose]:
@@ -65,7 +77,7 @@ def _fit() -> list[Row]:
         theirs = median_ms(
             lambda: RBFInterpolator(centres, values, kernel="gaussian", epsilon=2**-0.5, degree=-1),  # noqa: B023
             runs=3)
-        what = f"fit {samples} poses x {vertices:,} vertices"
+        what = f"fit {samples} poses x {vertices:,} vertices, one thread"
         rows += [Row(what, ours, "ms"), Row(f"{what}: SciPy's time over ours", theirs / ours, "", 1000.0, True)]
     at = _poses(1, 3, seed=5)[0]
     oracle = RBFInterpolator(centres, np.eye(129), kernel="gaussian", epsilon=2**-0.5, degree=-1)
@@ -88,8 +100,8 @@ def _synthesis() -> list[Row]:
         synthesise(prepared.deltas, now, prepared.starts, prepared.after, prepared.places, points, late, 0, vertices)
 
     calls = {
-        "its sums, weights given": lambda: sums(share),
-        "weights from the pose included": lambda: sums(run_weights(prepared, pose)),
+        "weights from the pose, then sums": lambda: sums(run_weights(prepared, pose)),
+        "the sums alone": lambda: sums(share),
         # given weights, the same sums, by the library every program would take
         "plain blend shapes by BLAS": lambda: np.add(flat, share[0] @ prepared.deltas, out=flat),
     }
@@ -100,12 +112,12 @@ def _synthesis() -> list[Row]:
             call()
             times[name].append((time.perf_counter() - start) * 1e3)
     best = {name: min(each) for name, each in times.items()}
-    what = f"{vertices:,} vertices x {samples} poses, one thread, best of 60"
-    mine, whole, plain = best.values()
+    what = f"synthesis of {vertices:,} vertices x {samples} poses, one thread, best of 60"
+    whole, mine, plain = best.values()
     return [
-        *(Row(f"synthesis of {what}: {name}", each, "ms") for name, each in best.items()),
-        Row("sums of the synthesis over plain blend shapes (compare at OPENBLAS_NUM_THREADS=1)", mine / plain, "", 1.1),
-        Row("  the same, weights from the pose included", whole / plain, ""),
+        *(Row(f"{what}: {name}", each, "ms") for name, each in best.items()),
+        Row("  weights and sums over plain blend shapes", whole / plain, "", 1.1),
+        Row("  the sums alone over plain blend shapes", mine / plain, "", 1.1),
     ]
 
 
@@ -169,3 +181,7 @@ def _dented(points: np.ndarray, rig: Rig, pose: Pose, seed: int, ring: np.ndarra
     out = deformed(points, rig, local_of_pose(rig.skeleton, pose))
     out[ring] += push
     return out
+
+
+if __name__ == "__main__":
+    print(json.dumps([*_fit(), *_synthesis()]))

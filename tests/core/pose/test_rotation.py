@@ -10,13 +10,13 @@ from core.pose.pose import Pose, local_of_pose, moved_controls, pose_of_local
 from core.pose.pose_space import Dof
 from core.pose.rotation import (
     euler_from_quaternion,
-    faded_twist,
     inverse,
     polar_rotation,
     quaternion_from_euler,
     relative,
     swing_angle,
     swing_twist,
+    swung_and_twisted,
     twist_angle,
 )
 from core.transform import quaternion_product
@@ -83,12 +83,13 @@ def test_angles_in_closed_form():
 
 
 def test_swing_alone_does_not_move_the_twist_until_it_nears_half_a_turn():
-    a = np.array([1.0, 0, 0])
     twist = Rotation.from_rotvec([0.7, 0, 0])
     for degrees in (0, 60, 119):
         q = (Rotation.from_rotvec(np.radians([0, degrees, 0])) * twist).as_quat()
-        assert np.allclose(faded_twist(q, a), [np.cos(0.7), np.sin(0.7)], atol=1e-12)
-    assert np.abs(faded_twist((Rotation.from_rotvec([0, np.pi, 0]) * twist).as_quat(), a)).max() < 1e-12
+        swing, at = np.radians(degrees), swung_and_twisted(q[None, None], np.eye(3)[None])[0, 0]
+        assert np.allclose(at, [np.cos(swing), 0, -np.sin(swing), np.cos(0.7), np.sin(0.7)], atol=1e-12)
+    half = (Rotation.from_rotvec([0, np.pi, 0]) * twist).as_quat()
+    assert np.abs(swung_and_twisted(half[None, None], np.eye(3)[None])[0, 0, 3:]).max() < 1e-12
 
 
 def test_through_half_a_turn_of_swing_the_coordinates_are_continuous():
