@@ -40,6 +40,7 @@ class PosedFrames:
         self._evaluator, self._budget = evaluator, budget
         self._used = 0
         self._kept: OrderedDict[tuple[int, float], _Kept] = OrderedDict()
+        self._held: dict[int, tuple[Mesh, Posed]] = {}  # the last pose each mesh was held in
 
     @property
     def bytes(self) -> int:
@@ -49,7 +50,7 @@ class PosedFrames:
     def posed(self, item: MeshObject, frame: float) -> Posed:
         """The mesh at a frame or in the pose it is held in, the same object as long as it is kept; else at rest."""
         if held(item):
-            return self._evaluator.get(_posed, item.mesh, shown_points(item, frame, self._evaluator))
+            return self._held_still(item, shown_points(item, frame, self._evaluator))
         if not moves(item):
             rest = skin_at_rest(item.mesh, self._evaluator)
             return Posed(rest.points, rest.normals)
@@ -87,6 +88,17 @@ class PosedFrames:
         ]
         return sorted(int(frame) for frame in set.intersection(*frames) if frame.is_integer())
 
+    def _held_still(self, item: MeshObject, points: NDArray[np.float32]) -> Posed:
+        """The mesh in the pose it is held in; a hand moves some of it, so only normals there are made anew."""
+        rest = skin_at_rest(item.mesh, self._evaluator)
+        mesh, last = self._held.get(item.id, (item.mesh, Posed(rest.points, rest.normals)))
+        if mesh is not item.mesh:
+            last = Posed(rest.points, rest.normals)
+        if last.points is not points:
+            last = Posed(points, mesh_normals(item.mesh, points, last))
+        self._held[item.id] = item.mesh, last
+        return last
+
     def _drop_older_than(self, item: MeshObject) -> None:
         """Drop poses of this mesh as it was before it was edited."""
         for key, kept in list(self._kept.items()):
@@ -95,7 +107,3 @@ class PosedFrames:
 
     def _remove(self, key: tuple[int, float]) -> None:
         self._used -= self._kept.pop(key).bytes
-
-
-def _posed(mesh: Mesh, points: NDArray[np.float32]) -> Posed:
-    return Posed(points, mesh_normals(mesh, points))

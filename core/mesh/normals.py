@@ -38,12 +38,17 @@ def vertex_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) ->
     return _polygon_vertex_normals(points, counts, np.ascontiguousarray(triangles, np.int32).reshape(-1))
 
 
-def mesh_normals(mesh: Mesh, points: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+def mesh_normals(
+    mesh: Mesh, points: NDArray[np.float32] | None = None,
+    known: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None,
+) -> NDArray[np.float32]:
     """Angle-weighted unit normals (V, 3) float32 of the vertices of a polygon mesh.
 
     points : (V, 3) float32, deformed positions instead of those of the mesh at rest.
+    known : points and normals (V, 3) float32 of this mesh as it was before some vertices moved: only normals around
+        these are made anew, and all are what they would be without it, to the last bit.
     """
-    return _polygon_vertex_normals(mesh.points if points is None else points, mesh.counts, mesh.corners)
+    return _polygon_vertex_normals(mesh.points if points is None else points, mesh.counts, mesh.corners, known)
 
 
 def _normals_and_areas(
@@ -56,12 +61,18 @@ def _normals_and_areas(
 
 
 def _polygon_vertex_normals(
-    points: NDArray[np.float32], counts: NDArray[np.int32], corners: NDArray[np.int32]
+    points: NDArray[np.float32], counts: NDArray[np.int32], corners: NDArray[np.int32],
+    known: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None,
 ) -> NDArray[np.float32]:
+    points = np.ascontiguousarray(points, np.float32)
     total = np.zeros((len(points), 3), np.float64)
-    _gather_polygons(np.ascontiguousarray(points, np.float32), counts, corners, total)
-    normals = np.empty((len(points), 3), np.float32)
-    _normalise(total, normals)
+    if known is None:
+        turned, normals = np.ones(len(points), np.bool_), np.empty((len(points), 3), np.float32)
+    else:
+        turned, normals = np.zeros(len(points), np.bool_), known[1].copy()
+        _mark_turned(points, np.ascontiguousarray(known[0], np.float32), counts, corners, turned)
+    _gather_polygons(points, counts, corners, turned, total)
+    _normalise(total, turned, normals)
     return normals
 
 
@@ -87,12 +98,39 @@ def _faces(points, triangles, normals, areas):  # type: ignore[no-untyped-def]
         normals[t, 0], normals[t, 1], normals[t, 2] = x * scale, y * scale, z * scale
 
 
-@njit(types.void(F32_2D, I32_1D, I32_1D, types.float64[:, ::1]), cache=True, nogil=True)
-def _gather_polygons(points, counts, corners, total):  # type: ignore[no-untyped-def]
-    """Add to every vertex the unit normal of each face around it times the angle of the face there."""
+@njit(cache=True, inline="always")
+def _any_of(marked, corners, start, count):  # type: ignore[no-untyped-def]
+    found = False
+    for k in range(start, start + count):
+        found |= marked[corners[k]]
+    return found
+
+
+@njit(types.void(F32_2D, F32_2D, I32_1D, I32_1D, types.boolean[::1]), cache=True, nogil=True)
+def _mark_turned(points, before, counts, corners, turned):  # type: ignore[no-untyped-def]
+    """Mark the vertices of all faces that have a vertex which moved."""
+    moved = np.empty(len(points), np.bool_)
+    for v in range(len(points)):
+        moved[v] = (
+            points[v, 0] != before[v, 0] or points[v, 1] != before[v, 1] or points[v, 2] != before[v, 2]
+        )  # fmt: skip
+    start = 0
+    for f in range(len(counts)):
+        if _any_of(moved, corners, start, counts[f]):
+            for k in range(start, start + counts[f]):
+                turned[corners[k]] = True
+        start += counts[f]
+
+
+@njit(types.void(F32_2D, I32_1D, I32_1D, types.boolean[::1], types.float64[:, ::1]), cache=True, nogil=True)
+def _gather_polygons(points, counts, corners, turned, total):  # type: ignore[no-untyped-def]
+    """Add to the vertices of faces with `turned` ones the unit normal of the face times its angle there."""
     start = 0
     for f in range(len(counts)):
         n = counts[f]
+        if not _any_of(turned, corners, start, n):
+            start += n
+            continue
         # Newell's vector area, relative to the first corner so that far-away meshes lose no digits
         o = corners[start]
         ox, oy, oz = np.float64(points[o, 0]), np.float64(points[o, 1]), np.float64(points[o, 2])
@@ -121,9 +159,11 @@ def _gather_polygons(points, counts, corners, total):  # type: ignore[no-untyped
         start += n
 
 
-@njit(types.void(types.float64[:, ::1], types.float32[:, ::1]), cache=True, nogil=True)
-def _normalise(total, normals):  # type: ignore[no-untyped-def]
+@njit(types.void(types.float64[:, ::1], types.boolean[::1], types.float32[:, ::1]), cache=True, nogil=True)
+def _normalise(total, turned, normals):  # type: ignore[no-untyped-def]
     for v in range(len(total)):
+        if not turned[v]:
+            continue
         x, y, z = total[v, 0], total[v, 1], total[v, 2]
         length = math.sqrt(x * x + y * y + z * z)
         # 1e-9 of a radian: opposite faces that cancel leave no direction worth having

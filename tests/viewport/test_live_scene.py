@@ -18,6 +18,7 @@ from core.groom.grow import grow
 from core.groom.plant import plant_scatter
 from core.groom.rows import take_rows
 from core.groom.style import load_style
+from core.mesh.normals import mesh_normals
 from core.mesh.skin import skin_at_rest
 from core.mesh.surface import rest_from_posed, strands_on_deformed
 from core.posed import skin_at
@@ -368,6 +369,19 @@ def test_poses_are_kept_within_their_budget_the_longest_unused_dropped(document,
         few.posed(item, frame)
         assert few.bytes <= 3 * size
     assert few.cached(document) == [1010, 1012, 1013]
+
+
+def test_a_mesh_that_is_held_has_the_normals_of_its_shape_whatever_was_shown_before(document, evaluator):
+    item = document.meshes[0]
+    frames = PosedFrames(evaluator)
+    half = item.mesh.points.copy()
+    half[: len(half) // 2, 1] += np.float32(0.01)
+    other = item.mesh.replace(points=freeze(half * np.float32(1.5)))
+    for mesh, surface in ((item.mesh, half), (item.mesh, half * 2), (other, half), (item.mesh, half), (other, half)):
+        shown = item.replace(mesh=mesh, surface=freeze(surface.copy()))
+        posed = frames.posed(shown, 1010.0)
+        assert np.array_equal(posed.normals, mesh_normals(mesh, surface))
+        assert frames.posed(shown, 1011.0) is posed
 
 
 def test_a_picture_of_rows_written_in_place_is_that_of_a_scene_made_anew(document, evaluator, ctx):

@@ -48,3 +48,33 @@ def test_far_from_the_origin_keeps_its_digits() -> None:
     far = points + np.float32([4096, 0, -4096])
     moved_back = (far.astype(np.float64) - [4096, 0, -4096]).astype(np.float32)
     np.testing.assert_allclose(vertex_normals(far, triangles), vertex_normals(moved_back, triangles), atol=1e-6)
+
+
+def test_after_a_move_they_are_those_of_the_whole_mesh_to_the_last_bit() -> None:
+    points, triangles = _sphere()
+    mesh = Mesh(
+        points=points, counts=np.full(len(triangles), 3, np.int32), corners=triangles.reshape(-1),
+        parts=np.zeros(len(triangles), np.int32), part_names=("ball",),
+    )
+    known = points, mesh_normals(mesh)
+    for share in (0.0, 0.002, 0.1, 1.0):
+        rng = np.random.default_rng(int(share * 1000))
+        moved = points + np.where(rng.random((len(points), 1)) < share, rng.normal(0, 0.1, points.shape), 0)
+        now = moved.astype(np.float32)
+        again = mesh_normals(mesh, now, known)
+        assert np.array_equal(again, mesh_normals(mesh, now))
+        known = now, again
+
+
+def test_far_from_what_moved_nothing_is_made_anew() -> None:
+    """Normals that are wrong beforehand stay so out of reach of the vertex that moved."""
+    points, triangles = _sphere()
+    mesh = Mesh(
+        points=points, counts=np.full(len(triangles), 3, np.int32), corners=triangles.reshape(-1),
+        parts=np.zeros(len(triangles), np.int32), part_names=("ball",),
+    )
+    now = points.copy()
+    now[5] *= np.float32(1.2)
+    found = mesh_normals(mesh, now, (points, np.full_like(points, 7.0)))
+    around = np.unique(triangles[(triangles == 5).any(axis=1)])
+    assert set(np.flatnonzero((found != 7.0).all(axis=1))) == set(around)
