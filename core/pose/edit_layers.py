@@ -250,7 +250,10 @@ def _layer(name: str, space: PoseSpace, vertices: NDArray[np.int32]) -> PoseLaye
 
 def _with_vertices(layer: PoseLayer, vertices: NDArray[np.int32]) -> PoseLayer:
     """The layer with these vertices among its own, in whatever order; nobody has moved the new ones."""
-    new = np.setdiff1d(vertices, layer.vertices).astype(np.int32)
+    wanted = np.zeros(int(max(vertices.max(initial=-1), layer.vertices.max(initial=-1))) + 1, np.bool_)
+    wanted[vertices] = True
+    wanted[layer.vertices] = False
+    new = np.flatnonzero(wanted).astype(np.int32)
     if not len(new):
         return layer
 

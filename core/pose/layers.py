@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from core.pose.controls import dofs_of, rests
 from core.pose.embedding import embed, scales
-from core.pose.extraction import MOST_CONDITION, after_skinning, before_skinning, skin_affine, surface_rotations
+from core.pose.extraction import MOST_CONDITION, Affine, after_skinning, before_skinning, skin_affine, surface_rotations
 from core.pose.pose import REST, Pose, local_of_pose, moved_controls
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
@@ -171,16 +171,15 @@ def extract_layer(
     condition = np.zeros(sampled.shape)
     for k, state in states.items():
         mine = sampled[k]
-        affine = skin_affine(rig, state.matrices, vertices[mine])
-        missing = surfaces[k, mine] - state.posed[rows[mine]]
-        deltas[k, mine], condition[k, mine] = before_skinning(affine, missing)
+        at = rows[mine]
+        affine = Affine(state.affine.turn[at], state.affine.move[at], state.affine.strongest[at])
+        deltas[k, mine], condition[k, mine] = before_skinning(affine, surfaces[k, mine] - state.posed[at])
     flagged: NDArray[np.bool_] = was_after | np.any(condition > MOST_CONDITION, axis=0)
     for k in range(count):
         mine = sampled[k] & flagged & (True if k in states else ~was_after)
         if mine.any():
             state = _state(points, rig, below, poses[k], vertices[mine])
-            affine = skin_affine(rig, state.matrices, vertices[mine])
-            deltas[k, mine] = after_skinning(affine, state.matrices, surfaces[k, mine] - state.posed)
+            deltas[k, mine] = after_skinning(state.affine, state.matrices, surfaces[k, mine] - state.posed)
     shares = skin_shares(space.dofs, space.weighted, rig, vertices)
     known = sampled.copy()
     if like is None or like.kind == "pose-space":
@@ -209,6 +208,7 @@ def diagonal(points: NDArray[np.float32]) -> float:
 
 class _State(NamedTuple):
     matrices: Array
+    affine: Affine  # of n vertices
     posed: Array  # (n, 3) float64, object space, with all layers below
 
 
@@ -226,7 +226,7 @@ def _state(
             turn = surface_rotations(skin_affine(rig, matrices, places), matrices)
             moves[places] += np.einsum("nij,nj->ni", turn, frame_moves.astype(np.float64))
         posed += moves[vertices]
-    return _State(matrices, posed)
+    return _State(matrices, affine, posed)
 
 
 def _hold(

@@ -31,6 +31,7 @@ from core.pose.rig import Control
 from core.pose.skeleton import Clip
 from core.pose.synthesis import evaluate, prepare
 from core.posed import skin_at
+from core.record import freeze
 from core.workers import Workers
 from core.workspace import Workspace
 from tests.core.pose.arms import arm, bumped, skinned_at, turned
@@ -313,3 +314,14 @@ def test_refused_records():
     ):
         with pytest.raises(ValueError):
             wrong()
+
+
+@pytest.mark.parametrize("apart", [1, 1000])
+def test_a_layer_names_a_vertex_once(apart):
+    rig, points = arm()
+    layer = build(points, rig, [Sculpt(turned("bent", fore=(0, 0, 90)), points + 0.1)]).correctives.layers[0]
+    vertices = np.arange(len(layer.vertices), dtype=np.int32) * apart
+    layer.replace(vertices=freeze(vertices.copy()))
+    vertices[7] = vertices[400]
+    with pytest.raises(ValueError, match="different"):
+        layer.replace(vertices=freeze(vertices.copy()))
