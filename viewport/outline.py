@@ -9,7 +9,7 @@ from viewport.kept import same
 from viewport.scene import Scene, all_points
 
 DIRECTIONS = 80  # over half a sphere: none is more than 0.25 radians from one of them or its opposite
-POINTS_AT_ONCE = 1 << 12  # that stay in the cache
+POINTS_AT_ONCE = 1 << 10  # that stay in the cache; products so small are made without waiting for other threads
 
 
 def _half_sphere(count: int) -> NDArray[np.float32]:
@@ -31,10 +31,15 @@ def outline_points(scene: Scene) -> NDArray[np.float32]:
     arrays = [np.asarray(points, np.float32) for points in all_points(scene) if len(points)]
     if not arrays:
         return np.zeros((0, 3), np.float32)
-    found = []
     points = np.concatenate(arrays)
     across = np.ptp(points, axis=0)
     spread = _SPREAD / np.maximum(across, 1e-6 * max(float(across.max()), 1e-30))  # as even for flat and long scenes
+    return _outermost(_outermost(points, spread), spread)
+
+
+def _outermost(points: NDArray[np.float32], spread: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Those of the points (N, 3) that lie farthest along a direction (K, 3) or against it among POINTS_AT_ONCE."""
+    found = []
     for start in range(0, len(points), POINTS_AT_ONCE):
         part = points[start : start + POINTS_AT_ONCE]
         along = spread @ part.T
