@@ -1,15 +1,9 @@
-"""What a timeline shows of a document: which frames are keyed, and how far clips reach."""
+"""What a timeline shows of a document: how far clips reach."""
 
 from __future__ import annotations
 
 from core.document import Document
 from core.posed import moves
-from tools.keyed import keyed_values
-
-
-def keyed_frames(document: Document) -> tuple[float, ...]:
-    """Frames at which any value has a key, ascending, each once."""
-    return tuple(sorted({key.frame for keyed in keyed_values(document) for key in keyed.curve.keys}))
 
 
 def clip_range(document: Document) -> tuple[float, float] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.window.commands import Command
+from app.window.curve_commands import CURVES
 from app.window.file_commands import EDIT, FILE, MACRO
 from app.window.plugin_bar import trouble_commands
 from app.window.scene_commands import SCENE
@@ -15,6 +16,6 @@ from tools.registry import Registry
 def all_commands(registry: Registry) -> tuple[Command, ...]:
     """Every command there is, in the order of the menus; those of the tools come from `registry`."""
     return (
-        *FILE, *EDIT, *SCENE, *VIEW, *FRAME, *tool_commands(registry), *HAND, *ACTION_COMMANDS, *MACRO, *WINDOW,
-        *trouble_commands(registry),
+        *FILE, *EDIT, *SCENE, *VIEW, *FRAME, *CURVES, *tool_commands(registry), *HAND, *ACTION_COMMANDS, *MACRO,
+        *WINDOW, *trouble_commands(registry),
     )

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Touches = Literal["document", "history", "workspace", "file", "settings", "window"]
 # where its hotkey works: the same key may mean different things over different parts of the window, and over the view
 # in different crafts
-Scope = Literal["everywhere", "viewport", "outliner", "groom", "pose"]
+Scope = Literal["everywhere", "viewport", "outliner", "curves", "groom", "pose"]
 CRAFT_SCOPES: tuple[Scope, ...] = ("groom", "pose")
 
 MOST_RECENT = 20

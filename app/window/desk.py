@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from app.window.jobs import Jobs
+from app.window.keys_at_hand import KeysAtHand
 from core.document import Document, MeshObject
 from core.errors import UserError
 from core.groom.groom import Groom
@@ -22,6 +23,7 @@ class Desk(QObject):
     workspace_changed : frame, camera, tool, panels ... (old, new).
     stroke_ended : after the release or the end of a stroke; panels that were silent during it look again.
     session_replaced : another document was opened; everything is to be read anew.
+    keys : of the curves, which are selected.
     said : a sentence for the status line. failed : an error in words, with a longer text to copy (or "").
     """
 
@@ -37,6 +39,7 @@ class Desk(QObject):
         self.session = session
         self.jobs = Jobs(self)
         self._listen(session)
+        self.keys = KeysAtHand(self)
 
     def replace_session(self, session: Session, discard: bool = False) -> None:
         """Put another session on the desk; the old one is closed."""

@@ -21,6 +21,7 @@ from app.window.commands import CRAFT_SCOPES, Command, Commands, Scope
 from app.window.icons import icon, icon_names
 from app.window.keymap import HELD, Keymap
 
+_CURVES = "filoplume_curves"  # property of widgets that show the keys of curves
 # widgets that read keys themselves: while one has the focus, only keys that work everywhere do
 _READS_KEYS = (QLineEdit, QPlainTextEdit, QTextEdit, QAbstractSpinBox, QComboBox, QAbstractItemView)
 
@@ -61,10 +62,12 @@ class Hotkeys(QObject):
         self._follow_focus()
 
     def scope(self) -> Scope | None:
-        """Where the hand is: over the viewport, in the outliner, or (None) in a widget that reads keys itself."""
+        """Where the hand is: over the viewport, in the outliner, at curves, or (None) where keys are read otherwise."""
         focus = QApplication.focusWidget()
         if focus is None:
             return "viewport"
+        if _at_curves(focus):
+            return None if isinstance(focus, QLineEdit) else "curves"
         if self._outliner is not None and (focus is self._outliner or self._outliner.isAncestorOf(focus)):
             return None if isinstance(focus, QLineEdit) else "outliner"
         return None if isinstance(focus, _READS_KEYS) else "viewport"
@@ -119,9 +122,8 @@ class Hotkeys(QObject):
         _, owners = self._shortcuts[text]
         scope = self.scope()
         craft = self._commands.desk.workspace.craft
-        own = [owners[s] for s in CRAFT_SCOPES if s == craft and s in owners] if scope == "viewport" else []
-        name = own[0] if own else owners.get(scope) if scope is not None else None
-        name = name or owners.get("everywhere")
+        places = [place for place in _searched(scope) if place not in CRAFT_SCOPES or place == craft]
+        name = next((owners[place] for place in places if place in owners), None)
         if name is not None:
             self._commands.run(name)
 
@@ -132,14 +134,31 @@ class Hotkeys(QObject):
     def _follow_focus(self, *_: object) -> None:
         scope = self.scope()
         for shortcut, owners in self._shortcuts.values():
-            shortcut.setEnabled(
-                "everywhere" in owners or scope in owners
-                or (scope == "viewport" and any(s in owners for s in CRAFT_SCOPES)))
+            shortcut.setEnabled(not owners.keys().isdisjoint(_searched(scope)))
 
     def _text(self, name: str) -> str:
         key = self.keymap.shown(name)
         label = self._commands[name].label.replace("&", "&&")
         return f"{label}\t{key}" if key else label
+
+
+def at_curves(widget: QWidget) -> None:
+    """Make a widget and what is in it a place where the hotkeys of curves work."""
+    widget.setProperty(_CURVES, True)
+
+
+def _at_curves(widget: QWidget | None) -> bool:
+    while widget is not None and not widget.property(_CURVES):
+        widget = widget.parentWidget()
+    return widget is not None
+
+
+def _searched(scope: Scope | None) -> tuple[Scope, ...]:
+    """Whose keys count in a place, the first before the others: what curves do not read goes to the view."""
+    if scope is None:
+        return ("everywhere",)
+    view: tuple[Scope, ...] = (*CRAFT_SCOPES, "viewport") if scope in ("viewport", "curves") else ()
+    return (*(() if scope == "viewport" else (scope,)), *view, "everywhere")
 
 
 def tooltip(command: Command, keymap: Keymap, reason: str | None = None) -> str:

@@ -26,6 +26,7 @@ from app.window.commands import Commands
 from app.window.console import Console
 from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
 from app.window.crash import CrashBar, CrashWatch
+from app.window.curve_panel import CurvePanel
 from app.window.desk import Desk
 from app.window.doors import Doors
 from app.window.file_actions import FileActions
@@ -54,7 +55,7 @@ from app.window.timeline import Timeline
 from app.window.top_bar import TopBar
 from app.window.view_host import ViewHost
 from app.window.viewport_widget import Viewport
-from app.window.window_commands import PANEL_CRAFTS, PANELS
+from app.window.window_commands import PANEL_CRAFTS, PANELS, shown_panels, written_panels
 from core.camera import Camera
 from core.document import Document
 from core.errors import UserError
@@ -63,7 +64,7 @@ from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
-AROUND = ("shelf", "timeline", "pose_map")  # panels that are not in the column
+AROUND = ("shelf", "timeline", "curves", "pose_map")  # panels that are not in the column
 COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
 
 
@@ -99,9 +100,10 @@ class MainWindow(QMainWindow):
         self.plugins = PluginBar(session.tools.troubles)
         self.status = StatusLine(self.desk, self.hotkeys)
         self.timeline = Timeline(self.desk)
+        self.curves = CurvePanel(self.desk, self.commands, self.hotkeys)
         self.pose_side = PoseSide(self.desk)
         self.panels: dict[str, QWidget] = {
-            "shelf": self.shelf, "timeline": self.timeline, "pose_map": self.pose_side}
+            "shelf": self.shelf, "timeline": self.timeline, "curves": self.curves, "pose_map": self.pose_side}
         self.column = self._make_column()
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
@@ -114,8 +116,10 @@ class MainWindow(QMainWindow):
         self.desk.changed.connect(self._document_changed)
         self.desk.workspace_changed.connect(self._workspace_changed)
         self.timeline.playback.changed.connect(self._playback_changed)
+        self.timeline.curves.clicked.connect(lambda: self.commands.run("window.curves"))
         self.viewport.failed.connect(self.view.show_trouble)
         self.viewport.hint.connect(self.status.show_doing)
+        self.curves.hint.connect(self.status.show_doing)
         self.viewport.settled.connect(self._show_cached)
         if loaded.trouble:
             self.desk.error(UserError(loaded.trouble))
@@ -153,7 +157,9 @@ class MainWindow(QMainWindow):
         self.split.setStretchFactor(0, 1)
         self.split.setStretchFactor(1, 0)
         self.split.setHandleWidth(look_of().grid)
-        across = QHBoxLayout()
+        upper = QWidget()
+        across = QHBoxLayout(upper)
+        across.setContentsMargins(0, 0, 0, 0)
         across.setSpacing(0)
         across.addWidget(self.shelf)
         across.addWidget(self.split, 1)
@@ -163,7 +169,14 @@ class MainWindow(QMainWindow):
         down.setSpacing(0)
         for bar in (self.top, self.recovery, self.crash, self.plugins):
             down.addWidget(bar)
-        down.addLayout(across, 1)
+        over = QSplitter(Qt.Orientation.Vertical)
+        over.setChildrenCollapsible(False)
+        over.setHandleWidth(look_of().grid)
+        over.addWidget(upper)
+        over.addWidget(self.curves)
+        over.setStretchFactor(0, 1)
+        over.setStretchFactor(1, 0)
+        down.addWidget(over, 1)
         down.addWidget(self.timeline)
         down.addWidget(self.status)
         self.setCentralWidget(whole)
@@ -266,13 +279,11 @@ class MainWindow(QMainWindow):
 
     def toggle_panel(self, name: str) -> None:
         """Show or hide a panel."""
-        panels = self._visible_panels()
-        wanted = tuple(p for p in panels if p != name) if name in panels else (*panels, name)
-        self.desk.set_workspace(panels=wanted)
+        self.desk.set_workspace(panels=written_panels({name} ^ set(shown_panels(self.desk.workspace.panels))))
 
     def reset_layout(self) -> None:
         """Every panel where it was at first."""
-        self.desk.set_workspace(panels=tuple(PANELS))
+        self.desk.set_workspace(panels=written_panels(shown_panels(())))
         self.view.dock()
         self._usual_split()
 
@@ -372,13 +383,8 @@ class MainWindow(QMainWindow):
 
     # -- what changes ------------------------------------------------------------------------------------
 
-    def _visible_panels(self) -> tuple[str, ...]:
-        return self.desk.workspace.panels or tuple(PANELS)
-
     def _show_panels(self) -> None:
-        visible = self._visible_panels()
-        if self.desk.workspace.panels != visible:
-            self.desk.session.set_workspace(panels=visible)
+        visible = shown_panels(self.desk.workspace.panels)
         craft = self.desk.session.tool.craft
         shown = {name for name in visible if PANEL_CRAFTS.get(name, craft) == craft}
         for name, panel in self.panels.items():
@@ -480,7 +486,7 @@ class MainWindow(QMainWindow):
 
 def fresh_workspace() -> Workspace:
     """Where a new document begins: with the comb, the coat as it is; guides show themselves when they are meant."""
-    return Workspace(tool="comb", panels=tuple(PANELS), view=ViewOptions(guides=False))
+    return Workspace(tool="comb", panels=written_panels(shown_panels(())), view=ViewOptions(guides=False))
 
 
 def _text(data: QByteArray) -> str:

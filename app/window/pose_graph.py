@@ -105,7 +105,7 @@ class Graph(QWidget):
         painter.drawText(below, Qt.AlignmentFlag.AlignHCenter, f"{self.up} / {self.across}")
         left = area.left()
         for k, line in enumerate(self.lines):
-            painter.setPen(QPen(_colour(k), 1.6))
+            painter.setPen(QPen(line_colour(k), 1.6))
             painter.drawPolyline(QPolygonF([self._pixel(x, y) for x, y in zip(line.x, line.y, strict=True)]))
             room = painter.fontMetrics().horizontalAdvance(line.name) + 10
             if left + room < area.right() + 10:
@@ -143,6 +143,7 @@ class Graph(QWidget):
             self.pointed.emit(low + min(max(part, 0.0), 1.0) * (high - low))
 
 
-def _colour(k: int) -> QColor:
+def line_colour(k: int) -> QColor:
+    """The colour of one of many lines, on the ground of the theme."""
     dark = look_of().theme.colour("panel").lightness() < 128
     return QColor.fromHsl(HUES[k % len(HUES)], 150, 165 if dark else 95)

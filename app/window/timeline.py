@@ -7,29 +7,31 @@ from itertools import pairwise
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPolygonF, QWheelEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QVBoxLayout, QWidget
 
 from app.window.desk import Desk
+from app.window.dope_row import DopeRow
 from app.window.icons import IconButton
 from app.window.playback import Playback
 from app.window.theme import Look, look_of, text_font
+from app.window.time_scale import TimeScale
 from core.document import Document
 from core.workspace import Workspace
 from tools.document_edits import set_document
-from tools.frames import clip_range, keyed_frames
+from tools.frames import clip_range
 
 STEPS = (1, 2, 5)  # times a power of ten: frames between two numbers of the ruler
 WHEEL = 120  # an eighth of a degree each: one notch
 
 
 class Ruler(QWidget):
-    """Frames from first to last: numbers, the current one, keys, the clip, what is cached. Dragging it scrubs."""
+    """Frames from first to last: numbers, the current one, the clip, what is cached. Dragging it scrubs."""
 
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk = desk
+        self.scale = TimeScale(desk, self)
         self._cached: tuple[tuple[int, int], ...] = ()
-        self._keys: tuple[float, ...] = ()
         self._clip: tuple[float, float] | None = None
         self._hover: int | None = None
         self._turned = 0
@@ -39,7 +41,7 @@ class Ruler(QWidget):
         self.setAccessibleName("Timeline")
         self.setToolTip(
             "Drag to scrub; the wheel and the arrows go one frame on or back, Home and End to the ends. "
-            "Green: cached, plays at full speed. Diamonds: keys. Grey line: the clip of the mesh.")
+            "Green: cached, plays at full speed. Grey line: the clip of the mesh.")
         self.read(desk.document)
 
     def sizeHint(self) -> QSize:
@@ -47,8 +49,8 @@ class Ruler(QWidget):
         return QSize(40 * look.text, 2 * look.row + look.grid)
 
     def read(self, document: Document) -> None:
-        """Read keys and clip of a document anew."""
-        self._keys, self._clip = keyed_frames(document), clip_range(document)
+        """Read the clip of a document anew."""
+        self._clip = clip_range(document)
         self.update()
 
     def set_cached(self, frames: Iterable[int]) -> None:
@@ -60,36 +62,22 @@ class Ruler(QWidget):
 
     def frame_at(self, x: float) -> int:
         """The frame of the timeline nearest to a place."""
-        document = self._desk.document
-        left, span = self._extent()
-        frames = document.last_frame - document.first_frame
-        along = (x - left) / span if span > 0 else 0.0
-        return document.first_frame + round(min(max(along, 0.0), 1.0) * frames)
+        return self.scale.frame_at(x)
 
     def x_of(self, frame: float) -> float:
         """Where a frame stands, in pixels; frames outside the timeline lie outside the ruler."""
-        document = self._desk.document
-        left, span = self._extent()
-        return left + span * (frame - document.first_frame) / max(1, document.last_frame - document.first_frame)
-
-    def _extent(self) -> tuple[float, float]:
-        margin = 2.0 * look_of().text
-        return margin, max(1.0, self.width() - 2.0 * margin)
-
-    def _go(self, frame: float) -> None:
-        document = self._desk.document
-        self._desk.set_workspace(frame=float(min(max(frame, document.first_frame), document.last_frame)))
+        return self.scale.x_of(frame)
 
     # -- the hand --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self._go(self.frame_at(event.position().x()))
+            self.scale.go(self.frame_at(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self._hover = self.frame_at(event.position().x())
         if event.buttons() & Qt.MouseButton.LeftButton:
-            self._go(self._hover)
+            self.scale.go(self._hover)
         self.update()
 
     def leaveEvent(self, event: object) -> None:
@@ -100,7 +88,7 @@ class Ruler(QWidget):
         self._turned += event.angleDelta().y()
         notches, self._turned = int(self._turned / WHEEL), self._turned - WHEEL * int(self._turned / WHEEL)
         if notches:
-            self._go(round(self._desk.workspace.frame) - notches)
+            self.scale.go(round(self._desk.workspace.frame) - notches)
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -114,7 +102,7 @@ class Ruler(QWidget):
         if wanted is None or event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
             super().keyPressEvent(event)
         else:
-            self._go(wanted)
+            self.scale.go(wanted)
 
     # -- the picture -----------------------------------------------------------------------------------------
 
@@ -126,7 +114,6 @@ class Ruler(QWidget):
         bottom = self.height() - look.grid - 2.0
         self._paint_ticks(painter, look, numbers, bottom)
         self._paint_clip(painter, look, bottom)
-        self._paint_keys(painter, look, bottom)
         if self._hover is not None:
             painter.fillRect(QRectF(round(self.x_of(self._hover)), numbers, 1.0, bottom - numbers),
                              look.theme.colour("dim"))
@@ -136,9 +123,9 @@ class Ruler(QWidget):
         document = self._desk.document
         first, last = document.first_frame, document.last_frame
         widest = painter.fontMetrics().horizontalAdvance(str(max(abs(first), abs(last))) + "-")
-        step = _step(last - first, int(self._extent()[1] / (widest + 3 * look.text)))
+        step = _step(last - first, int(self.scale.extent()[1] / (widest + 3 * look.text)))
         minor = step // 2 if step % 2 == 0 else step // 5 if step % 5 == 0 else step
-        left, span = self._extent()
+        left, span = self.scale.extent()
         current = min(max(round(self.x_of(self._desk.workspace.frame)), left), left + span)
         wide = painter.fontMetrics().horizontalAdvance(_words(self._desk.workspace.frame))
         for frame in range(first, last + 1, max(1, minor)):
@@ -156,7 +143,7 @@ class Ruler(QWidget):
                          _words(frame))
 
     def _paint_clip(self, painter: QPainter, look: Look, bottom: float) -> None:
-        left, span = self._extent()
+        left, span = self.scale.extent()
         if self._clip is not None:
             a, b = (min(max(self.x_of(f), left), left + span) for f in self._clip)
             painter.fillRect(QRectF(a, bottom + 1, max(b - a, 1.0), 1.0), look.theme.colour("dim"))
@@ -166,25 +153,13 @@ class Ruler(QWidget):
             if b > a:
                 painter.fillRect(QRectF(a, bottom, b - a, float(look.grid)), look.theme.colour("cached"))
 
-    def _paint_keys(self, painter: QPainter, look: Look, bottom: float) -> None:
-        document = self._desk.document
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(look.theme.colour("text"))
-        r, drawn = 3.5, -1e9
-        for frame in self._keys:
-            x = self.x_of(frame) + 0.5
-            if document.first_frame <= frame <= document.last_frame and x - drawn >= 1.0:
-                y, drawn = bottom - 6.0, x
-                painter.drawPolygon(QPolygonF([QPointF(x, y - r), QPointF(x + r, y), QPointF(x, y + r),
-                                               QPointF(x - r, y)]))
-
     def _paint_current(self, painter: QPainter, look: Look, numbers: float, bottom: float) -> None:
         frame = self._desk.workspace.frame
-        left, span = self._extent()
+        left, span = self.scale.extent()
         x = min(max(round(self.x_of(frame)), left), left + span)
         accent = look.theme.colour("accent")
         painter.fillRect(QRectF(x - 0.5, numbers + 2, 2.0, bottom - numbers - 2), accent)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setBrush(accent)
         painter.setPen(Qt.PenStyle.NoPen)
         half, middle = 0.5 * look.text, x + 0.5
@@ -209,9 +184,9 @@ class NumberField(QLineEdit):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.editingFinished.connect(self._finished)
 
-    def show_number(self, number: float) -> None:
-        """Show a number, unless another is being typed."""
-        self._value = f"{number:.10g}"
+    def show_number(self, number: float | None) -> None:
+        """Show a number (None: nothing, for several), unless another is being typed."""
+        self._value = "" if number is None else f"{number:.10g}"
         if not (self.hasFocus() and self.isModified()):
             self.setText(self._value)
 
@@ -238,13 +213,15 @@ class NumberField(QLineEdit):
 
 
 class Timeline(QWidget):
-    """Buttons, ruler, range and rate. `playback` plays it; tell :meth:`set_cached` what is cached."""
+    """Buttons, ruler with the keys below it, range and rate. `playback` plays it; tell :meth:`set_cached` what is
+    cached. `curves` is the button that asks for the curves over it."""
 
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk = desk
         self.playback = Playback(desk, self)
         self.ruler = Ruler(desk)
+        self.keys = DopeRow(desk.keys, self.ruler.scale)
         self.play = IconButton("play", "Plays the frames in a loop at the rate of the project, or stops.")
         self.frame = NumberField("The current frame; type another to go there.", self._type_frame)
         self.first = NumberField("The first frame of the timeline; type another to change the range.",
@@ -267,12 +244,18 @@ class Timeline(QWidget):
         for widget in (self.first_button, self.previous_button, self.play, self.next_button, self.last_button,
                        self.frame):
             line.addWidget(widget)
-        line.addWidget(self.ruler, 1)
+        times = QVBoxLayout()
+        times.setSpacing(0)
+        times.addWidget(self.ruler)
+        times.addWidget(self.keys)
+        line.addLayout(times, 1)
         for widget in (self.first, self._dash, self.last):
             line.addWidget(widget)
         line.addSpacing(8)
         line.addWidget(self.rate)
         line.addWidget(self._unit)
+        self.curves = IconButton("curve", "Shows or hides the curves of keyed values over the timeline.")
+        line.addWidget(self.curves)
         self.playback.changed.connect(lambda: self.play.set_icon("pause" if self.playback.playing else "play"))
         desk.changed.connect(self._changed)
         desk.workspace_changed.connect(self._workspace_changed)
@@ -284,6 +267,7 @@ class Timeline(QWidget):
         """Show the document as it is."""
         document = self._desk.document
         self.ruler.read(document)
+        self.keys.update()
         self.first.show_number(document.first_frame)
         self.last.show_number(document.last_frame)
         self.rate.show_number(document.fps)
@@ -302,9 +286,8 @@ class Timeline(QWidget):
     def _changed(self, old: Document, new: Document) -> None:
         if self._desk.session.stroking:
             return
-        coats = [g.coat for g in old.grooms] != [g.coat for g in new.grooms]  # records compare by identity
         times = (old.first_frame, old.last_frame, old.fps) != (new.first_frame, new.last_frame, new.fps)
-        if coats or times or old.meshes is not new.meshes:
+        if times or old.meshes is not new.meshes:
             self.refresh()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:

@@ -17,7 +17,7 @@ from app.window.theme import look_of, text_font
 LOOK_AGAIN = 400  # ms after a change, when the autosave has had its time
 ABOUT = {
     "File": "file", "Edit": "edit", "View": "view", "Tools": "tool", "Groom": "groom", "Time": "frame",
-    "Window": "window",
+    "Curves": "curves", "Window": "window",
 }
 
 

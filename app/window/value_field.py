@@ -162,7 +162,7 @@ class ValueField(QWidget):
         base = self._value.base
         if shown and isinstance(base, Curve) and self.curve is None:
             self.curve = CurveEditor(base, self.bar.scale, self._frame)
-            self.curve.edited.connect(self._curve_edited)
+            self.curve.edited_one.connect(self._curve_edited)
             self._column.addWidget(self.curve)
         elif not shown and self.curve is not None:
             self._column.removeWidget(self.curve)

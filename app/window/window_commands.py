@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
 from app.window.commands import Command, Window
@@ -24,12 +24,15 @@ PANELS = {
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
     "history": ("History", "Shows or hides the list of steps that undo goes through."),
+    "curves": ("Curves", "Shows or hides the curves of keyed values over the timeline, to be edited together."),
     "timeline": ("Timeline", "Shows or hides frames and playback at the bottom of the window."),
 }
 # panels that belong to one craft; the others are those of all
 PANEL_CRAFTS = {
     "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "pose_map": "pose",
 }
+AT_FIRST_HIDDEN = ("curves",)
+PUT_AWAY = "-"  # before the name of a panel in Workspace.panels that was hidden by hand
 TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels
 _SETTINGS = "app.window.settings.save_settings"
 _WORKSPACE = "core.workspace.Workspace"
@@ -40,7 +43,18 @@ def _toggle(panel: str) -> Callable[[Window], None]:
 
 
 def _visible(panel: str) -> Callable[[Desk], bool]:
-    return lambda desk: panel in desk.session.workspace.panels
+    return lambda desk: panel in shown_panels(desk.session.workspace.panels)
+
+
+def shown_panels(panels: Sequence[str]) -> tuple[str, ...]:
+    """The panels a workspace shows. One it says nothing of is new since it was saved, and shown as at first."""
+    return tuple(name for name in PANELS
+                 if name in panels or (PUT_AWAY + name not in panels and name not in AT_FIRST_HIDDEN))
+
+
+def written_panels(shown: Collection[str]) -> tuple[str, ...]:
+    """How a workspace says which panels it shows, so that it says something of every one there is."""
+    return tuple(name if name in shown else PUT_AWAY + name for name in PANELS)
 
 
 def _theme(window: Window) -> None:

@@ -14,8 +14,10 @@ from app.window.icons import icon_names
 from app.window.radial import MOST
 from app.window.tool_commands import radial_names
 from core.camera import Camera, frame_points, look_at
+from core.curve import Curve, Key
 from core.document import with_groom
 from core.errors import UserError
+from core.value import Value
 from tests.window.host import Host
 from tools.registry import Registry
 from tools.tool import Pointer, Sight
@@ -70,7 +72,8 @@ def test_names_and_labels_are_unique_and_every_tool_is_there(host: Host) -> None
 
 ASKING = ("file.import_mesh", "file.reload_mesh")  # these ask for a file first; the window's own tests drive them
 BEFORE = {
-    "view.unhide_all": "view.hide", "groom.thaw_all": "groom.freeze_others", "groom.wash_all": "groom.spray_selected"}
+    "curves.paste": "curves.copy", "view.unhide_all": "view.hide", "groom.thaw_all": "groom.freeze_others",
+    "groom.wash_all": "groom.spray_selected"}
 
 
 @pytest.mark.parametrize("command", [c for c in TABLE if c.undo is not None and c.name not in ASKING],
@@ -88,15 +91,18 @@ def test_the_step_has_the_name_it_promises(command: Command, host: Host) -> None
 
 
 def bend_and_select(host: Host) -> None:
-    """Bent hair, half of it selected, some of it through the skin: there is something to do for every command."""
+    """Bent hair, half of it selected, some through the skin, and two kinds of keys: something for every command."""
     document = host.desk.document
     groom = document.grooms[0]
     points = groom.guides.points.copy()
     points[:, 2, 0] += np.linspace(0.01, 0.05, len(points))
     points[0, -1, 1] = -0.05
     selected = np.arange(len(points)) % 2 == 0
+    keys = (Key(frame=990.3, value=0.1), Key(frame=1004.6, value=0.5, arrive="linear", leave="linear"))
     host.desk.session.commit("Bend", with_groom(document, groom.replace(
-        guides=groom.guides.replace(points=points, selected=selected))))
+        guides=groom.guides.replace(points=points, selected=selected),
+        coat=groom.coat.replace(clump=Value(base=Curve(keys=keys))))))
+    host.desk.keys.select_all()
 
 
 def test_every_tool_has_a_radial_menu_of_commands(host: Host) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor, QWheelEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.window.desk import Desk
@@ -41,9 +41,9 @@ def at(timeline: Timeline, frame: float) -> QPoint:
     return QPoint(round(timeline.ruler.x_of(frame)), timeline.ruler.height() // 2)
 
 
-def colours(timeline: Timeline, frame: float) -> set[str]:
-    """Of the column of pixels at a frame."""
-    image = timeline.ruler.grab().toImage()
+def colours(timeline: Timeline, frame: float, row: QWidget | None = None) -> set[str]:
+    """Of the column of pixels at a frame, of the ruler or what is below it."""
+    image = (row or timeline.ruler).grab().toImage()
     ratio = image.devicePixelRatio()
     x = round(timeline.ruler.x_of(frame) * ratio)
     return {QColor(image.pixel(x, y)).name() for y in range(image.height())}
@@ -119,10 +119,45 @@ def test_cached_frames_keys_and_the_current_frame_are_seen(desk: Desk, timeline:
     assert theme.cached in colours(timeline, 1060)
     assert theme.cached not in colours(timeline, 1040)
     assert theme.accent in colours(timeline, 1090)
-    assert theme.text in colours(timeline, 1010)  # the diamond of a key
-    assert theme.text not in colours(timeline, 1012)
+    assert theme.text in colours(timeline, 1010, timeline.keys)  # the diamond of a key
+    assert theme.text not in colours(timeline, 1012, timeline.keys)
     desk.edit("Flat", lambda document: small_document())
-    assert theme.text not in colours(timeline, 1010)
+    assert not timeline.keys.isVisible()
+
+
+def test_keys_below_the_ruler_are_selected_and_dragged(desk: Desk, timeline: Timeline, qtbot: QtBot) -> None:
+    row = timeline.keys
+
+    def place(frame: float) -> QPoint:
+        return QPoint(round(timeline.ruler.x_of(frame)), row.height() // 2)
+
+    before = desk.document
+    qtbot.mousePress(row, Qt.MouseButton.LeftButton, pos=place(1010))
+    assert desk.keys.count == 2  # of both curves
+    qtbot.mouseMove(row, place(1015.3))
+    qtbot.waitUntil(lambda: key_frames(desk) == {1001.0, 1015.0, 1030.0})
+    assert desk.session.history.undo_name is None  # while it is dragged
+    qtbot.mouseMove(row, place(1030))  # on top of others: it stays
+    qtbot.mouseRelease(row, Qt.MouseButton.LeftButton, pos=place(1015.3))
+    assert desk.session.history.undo_name == "Move keys"
+    desk.session.undo()
+    assert desk.document is before
+    qtbot.mousePress(row, Qt.MouseButton.LeftButton, pos=place(1004))
+    assert desk.keys.count == 0
+    qtbot.mouseMove(row, place(1050))
+    qtbot.mouseRelease(row, Qt.MouseButton.LeftButton, pos=place(1050))
+    assert desk.keys.count == 4
+    qtbot.mousePress(row, Qt.MouseButton.LeftButton, pos=place(1010))
+    qtbot.mouseMove(row, place(1020))
+    qtbot.waitUntil(lambda: key_frames(desk) == {1001.0, 1020.0, 1040.0})
+    qtbot.keyClick(row, Qt.Key.Key_Escape)
+    assert desk.document is before
+    qtbot.mouseDClick(row, Qt.MouseButton.LeftButton, pos=place(1030))
+    assert desk.workspace.frame == 1030.0
+
+
+def key_frames(desk: Desk) -> set[float]:
+    return {key.frame for keyed in desk.keys.all for key in keyed.curve.keys}
 
 
 @pytest.mark.parametrize("frames", [(7, 7), (-5, 5), (0, 2_000_000), (-(2**31), 2**31 - 1)])

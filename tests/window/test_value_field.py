@@ -33,7 +33,8 @@ def mouse(widget: QWidget, kind: str, at: QPointF, held: Qt.KeyboardModifier = N
 class Told:
     def __init__(self, widget: ValueField | CurveEditor) -> None:
         self.all: list[tuple[object, bool]] = []
-        widget.edited.connect(lambda value, final: self.all.append((value, final)))
+        edited = widget.edited_one if isinstance(widget, CurveEditor) else widget.edited
+        edited.connect(lambda value, final: self.all.append((value, final)))
 
     @property
     def finals(self) -> list[object]:
@@ -183,7 +184,7 @@ def editor(qtbot: QtBot, base: Curve) -> tuple[CurveEditor, Told]:
         widget.show()
         widget.activateWindow()
     widget.setFocus()
-    widget.show_all()
+    widget.show_keys()
     return widget, Told(widget)
 
 
@@ -230,7 +231,7 @@ def test_a_handle_frees_its_tangents_and_the_curve_follows_it(qtbot: QtBot) -> N
     mouse(widget, "move", at + QPointF(0.0, -30.0))
     mouse(widget, "release", at + QPointF(0.0, -30.0))
     key = widget.curve().keys[1]
-    assert (key.arrive, key.leave) == ("free", "free")
+    assert (key.arrive, key.leave) == ("aligned", "aligned")
     slope_in = key.arrive_handle[1] / key.arrive_handle[0]
     assert key.leave_handle[1] / key.leave_handle[0] == pytest.approx(slope_in)
     assert float(curve_at(widget.curve(), 12.0)) > before
@@ -245,7 +246,7 @@ def test_double_click_sets_a_key_delete_takes_it_and_one_stays(qtbot: QtBot) -> 
     assert widget.curve().keys[1].value == pytest.approx(0.9)
     QTest.keyClick(widget, Qt.Key.Key_Delete)
     assert [k.frame for k in widget.curve().keys] == [0.0, 10.0]
-    widget.selected = frozenset({0, 1})
+    widget.pick({"": frozenset({0, 1})})
     QTest.keyClick(widget, Qt.Key.Key_Delete)
     assert len(widget.curve().keys) == 2
     assert len(told.finals) == 2
@@ -253,7 +254,7 @@ def test_double_click_sets_a_key_delete_takes_it_and_one_stays(qtbot: QtBot) -> 
 
 def test_f_shows_what_is_selected(qtbot: QtBot) -> None:
     widget, _ = editor(qtbot, curve((0, 0.0), (10, 1.0), (1000, 0.5)))
-    widget.selected = frozenset({0, 1})
+    widget.pick({"": frozenset({0, 1})})
     QTest.keyClick(widget, Qt.Key.Key_F)
     assert 0 < widget.place_of(0, 0.0).x() < widget.place_of(10, 1.0).x() < widget.width()
     assert widget.place_of(1000, 0.5).x() > widget.width()
