@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from core.document import MeshObject
 from core.errors import UserError
 from core.formats.atomic import atomic_write
+from core.pose.blend_shapes import BlendShapes
 from core.pose.pose_space import Kernel
+from core.pose.rig import Rig
 from core.pose.synthesis import Prepared, prepare
 
 FORMAT: Literal["filoplume-runtime"] = "filoplume-runtime"
-VERSION = 1
+VERSION = 2
 LARGEST_JSON, LARGEST_ARRAYS = 64 << 20, 4 << 30  # bytes
 DAMAGE = (ValueError, KeyError, IndexError, OverflowError, EOFError, zipfile.BadZipFile, NotImplementedError)
 ARRAYS: dict[str, tuple[str, tuple[int | None, ...]]] = {
@@ -80,6 +82,7 @@ class RuntimeHead(msgspec.Struct, forbid_unknown_fields=True):
     version: int
     name: str
     arrays: str
+    skinning: Literal["linear", "dual-quaternion"]
     joints: list[str]
     shapes: list[str]
     numbers: dict[str, float]
@@ -99,25 +102,21 @@ def runtime_of(item: MeshObject, arrays_name: str) -> Runtime:
     Raises
     ------
     UserError
-        When the rig is skinned with dual quaternions, or has plain correctives, which the format does not know.
+        When there is no rig, or it has plain correctives, which the format does not know.
     """
     rig = item.rig
     if rig is None:
         raise UserError(f"{item.name} has no rig to write; give it a skeleton first.")
-    if rig.skinning != "linear":
-        raise UserError("The runtime file knows linear skinning only; bake the points instead, or skin linearly.")
-    arrays: dict[str, NDArray[Any]] = {
-        "points": item.mesh.points, "parents": rig.skeleton.parents, "rest": rig.skeleton.rest,
-        "inverse_bind": np.linalg.inv(rig.skeleton.bind), "joints": rig.skin.joints, "weights": rig.skin.weights,
+    names, arrays = _carriers(rig)
+    arrays |= {
+        "points": item.mesh.points,
         "file_vertices": np.arange(len(item.mesh.points)) if rig.file_vertices is None else rig.file_vertices,
     }
     if rig.shapes is not None:
-        s = rig.shapes
-        arrays |= {"shape": s.shape, "shape_at": s.at, "shape_starts": s.starts, "shape_vertices": s.vertices,
-                   "shape_offsets": s.offsets}
+        arrays |= _targets_with_rest(rig.shapes)
     layers = [_layer(k, ready, arrays) for k, ready in enumerate(prepare(item.correctives, rig))]
     head = RuntimeHead(
-        FORMAT, VERSION, item.name, arrays_name, list(rig.skeleton.names),
+        FORMAT, VERSION, item.name, arrays_name, rig.skinning, names,
         [] if rig.shapes is None else list(rig.shapes.names), {c.name: c.rest for c in rig.controls}, layers,
     )
     return Runtime(head, arrays)
@@ -157,7 +156,7 @@ def read_runtime(path: Path) -> Runtime:
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UserError(f"{path.name} cannot be read: {str(error).rstrip('.')}.") from None
     if head.version != VERSION:
-        raise UserError(f"{path.name} is of version {head.version}, this program reads {VERSION}; update it.")
+        raise UserError(f"{path.name} is of version {head.version}, this program reads {VERSION}; write it again.")
     if Path(head.arrays).name != head.arrays or not head.arrays.endswith(".npz"):
         raise UserError(f"{path.name} names arrays outside its folder; write it again.")
     try:
@@ -168,6 +167,38 @@ def read_runtime(path: Path) -> Runtime:
     except DAMAGE as error:
         raise UserError(f"{head.arrays} is damaged or does not belong to {path.name}: {error}.") from error
     return Runtime(head, arrays)
+
+
+def _carriers(rig: Rig) -> tuple[list[str], dict[str, NDArray[Any]]]:
+    """Names of the joints, and their arrays; what no joint moves is carried by a last one that stays."""
+    skeleton, names, still = rig.skeleton, list(rig.skeleton.names), np.eye(4)[None]
+    inverse = np.linalg.inv(skeleton.bind)
+    if rig.skin.joints.shape[1]:
+        return names, {
+            "parents": skeleton.parents, "rest": skeleton.rest, "inverse_bind": inverse, "joints": rig.skin.joints,
+            "weights": rig.skin.weights,
+        }
+    count = len(rig.skin.joints)
+    names.append(next(n for n in ("still", *(f"still{i}" for i in range(len(names)))) if n not in names))
+    return names, {
+        "parents": np.append(skeleton.parents, -1), "rest": np.concatenate([skeleton.rest, still]),
+        "inverse_bind": np.concatenate([inverse, still]), "joints": np.full((count, 1), len(names) - 1),
+        "weights": np.ones((count, 1)),
+    }
+
+
+def _targets_with_rest(shapes: BlendShapes) -> dict[str, NDArray[Any]]:
+    """Arrays of the targets of all shapes, each shape with rest, which moves nothing, as its target at 0."""
+    own = len(shapes.shape)
+    shape = np.concatenate([shapes.shape, np.arange(len(shapes.names))])
+    at = np.concatenate([shapes.at, np.zeros(len(shapes.names))])
+    order = np.lexsort((at, shape))
+    rows = [np.arange(shapes.starts[t], shapes.starts[t + 1]) if t < own else np.zeros(0, np.int64) for t in order]
+    taken = np.concatenate(rows)
+    return {
+        "shape": shape[order], "shape_at": at[order], "shape_starts": np.cumsum([0, *map(len, rows)]),
+        "shape_vertices": shapes.vertices[taken], "shape_offsets": shapes.offsets[taken],
+    }
 
 
 def _layer(k: int, ready: Prepared, arrays: dict[str, NDArray[Any]]) -> RuntimeLayer:
@@ -188,7 +219,8 @@ def _layer(k: int, ready: Prepared, arrays: dict[str, NDArray[Any]]) -> RuntimeL
             systems.append(RuntimeSystem(solved.silent, 0.0 if plane is None else float(plane.size)))
             arrays |= {
                 f"{at}.centres": solved.centres, f"{at}.scales": solved.scales,
-                f"{at}.inverse": np.zeros((0, 0)) if solved.inverse is None else solved.inverse,
+                # Shepard's shares are the weights
+                f"{at}.inverse": np.eye(len(solved.centres)) if solved.inverse is None else solved.inverse,
                 f"{at}.middle": np.zeros(0) if plane is None else plane.middle,
                 f"{at}.across": np.zeros((0, 0)) if plane is None else plane.across,
                 f"{at}.samples": np.flatnonzero(known),
@@ -267,6 +299,9 @@ def _check(head: RuntimeHead, arrays: dict[str, NDArray[Any]]) -> None:
         must(len(arrays["shape_offsets"]) == rows, "offsets are missing")
         within("shape", len(head.shapes))
         within("shape_vertices", vertices)
+        stops, steps = np.bincount(arrays["shape"], minlength=len(head.shapes)), np.diff(arrays["shape"])
+        rises = np.diff(arrays["shape_at"])[steps == 0]
+        must(bool(stops.min() >= 2 and (steps >= 0).all() and (rises > 0).all()), "a shape goes nowhere")
     widths = {"swing": 3, "twist": 2, "swing-twist": 5, "translation": 3, "number": 1}
     for k, layer in enumerate(head.layers):
         wide = sum(widths[dof.kind] for dof in layer.dofs)
@@ -277,7 +312,7 @@ def _check(head: RuntimeHead, arrays: dict[str, NDArray[Any]]) -> None:
             centres, inverse = arrays[f"{at}.centres"], arrays[f"{at}.inverse"]
             extra = arrays[f"{at}.across"].shape[1] + 1 if system.size else 0
             must(centres.shape[1] == wide and arrays[f"{at}.scales"].shape == centres.shape, "centres do not fit")
-            must(inverse.size == 0 or inverse.shape == (len(centres) + extra, len(centres)), "a system does not fit")
+            must(inverse.shape == (len(centres) + extra, len(centres)), "a system does not fit")
             must(not system.size or (len(arrays[f"{at}.across"]) == wide == len(arrays[f"{at}.middle"])), "a plane")
             must(0 <= system.silent <= len(centres), "a system has impossible centres")
             must(len(arrays[f"{at}.samples"]) == len(centres) - system.silent, "samples do not fit")

@@ -43,8 +43,8 @@ ELSEWHERE = (
 )
 
 
-def posed_arm(poses=POSES, levels=1, seed=4, **options):
-    """An arm with a blend shape with an inbetween, a dial, a clip, and random sculpts at poses."""
+def posed_arm(poses=POSES, levels=1, seed=4, rig=None, **options):
+    """An arm (or another rig of its mesh) with a blend shape with an inbetween, a dial, a clip, and random sculpts."""
     made = arm(levels)
     rng = np.random.default_rng(seed)
     count = len(made.mesh.points)
@@ -52,7 +52,8 @@ def posed_arm(poses=POSES, levels=1, seed=4, **options):
     near = np.linalg.norm(made.mesh.points - (0.15, 0.03, 0.0), axis=1) < 0.08
     swell[:, near] = rng.normal(0.0, 0.004, (2, int(near.sum()), 3))
     shapes = targets_from_dense(("swell",), [0, 0], [0.5, 1.0], list(swell))
-    rig = made.rig.replace(shapes=shapes, controls=(Control(name="swell"), Control(name="strain", low=-1.0, high=1.0)))
+    controls = (Control(name="swell"), Control(name="strain", low=-1.0, high=1.0))
+    rig = (rig or made.rig).replace(shapes=shapes, controls=controls)
     frames = [between(Pose(), BENT, f) for f in np.linspace(0.0, 1.0, 5)]
     frames += [between(BENT, BOTH, f) for f in np.linspace(0.2, 1.0, 5)]
     rig = rig.replace(clip=clip_of_matrices(

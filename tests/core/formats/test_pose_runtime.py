@@ -11,7 +11,9 @@ import pytest
 from core.errors import UserError
 from core.formats.pose_runtime import read_runtime, runtime_of, write_runtime
 from core.pose.corrective import as_kind
+from core.pose.skeleton import SkinWeights
 from core.pose.synthesis import evaluate, prepare
+from core.record import freeze
 from tests.core.formats.posed_samples import BENT, BOTH, ELSEWHERE, FLEXED, HALF, posed_arm, turned
 
 MANUAL = Path(__file__).parents[3] / "docs" / "pose.md"
@@ -62,6 +64,25 @@ def test_with_every_option(options, tmp_path):
     check(posed_arm((BENT, HALF, FLEXED, BOTH), **options), tmp_path)
 
 
+@pytest.mark.parametrize("squashed", [False, True])
+def test_with_dual_quaternions(squashed, tmp_path):
+    """Where `squashed`, of joints that are scaled and sheared at rest, one of them mirrored."""
+    rig = posed_arm(()).rig.replace(skinning="dual-quaternion")
+    if squashed:
+        rest = rig.skeleton.rest.copy()
+        rest[1, :3, :3] @= np.array([[1.3, 0.2, 0.0], [0.0, 0.8, 0.1], [0.0, 0.0, 1.1]])
+        rest[2, :3, :3] @= np.diag([1.0, 1.0, -1.0])
+        rig = rig.replace(skeleton=rig.skeleton.replace(rest=freeze(rest)))
+    check(posed_arm(rig=rig), tmp_path)
+
+
+def test_what_no_joint_moves(tmp_path):
+    item = posed_arm((FLEXED,))
+    count = len(item.mesh.points)
+    none = SkinWeights(joints=np.zeros((count, 0), np.int32), weights=np.zeros((count, 0), np.float32))
+    check(item.replace(rig=item.rig.replace(skin=none)), tmp_path)
+
+
 def test_read_back_it_is_what_was_written(tmp_path):
     item = posed_arm()
     write_runtime(tmp_path / "arm.json", item)
@@ -74,8 +95,6 @@ def test_read_back_it_is_what_was_written(tmp_path):
 
 def test_what_the_format_cannot_say_is_refused():
     item = posed_arm((BENT,))
-    with pytest.raises(UserError, match="linear skinning"):
-        runtime_of(item.replace(rig=item.rig.replace(skinning="dual-quaternion")), "arm.npz")
     with pytest.raises(UserError, match="plain corrective"):
         runtime_of(item.replace(correctives=as_kind(item.correctives, "linear")), "arm.npz")
     with pytest.raises(UserError, match="no rig"):
@@ -99,6 +118,7 @@ def rewritten(source, target, **changes):
     {"layer0.system0.inverse": np.zeros((1, 1))},
     {"layer0.system0.samples": np.array([7], np.int32)},
     {"shape_starts": np.array([0, 1 << 40, 5], np.int64)},
+    {"shape_at": np.array([0.0, 0.5, 0.5])},
     {"layer0.run0.deltas": None},
     {"extra": np.zeros(1)},
     {"points": np.array([object()])},
@@ -112,7 +132,8 @@ def test_hostile_arrays_are_refused(changes, tmp_path):
 
 
 @pytest.mark.parametrize("change", [
-    {"version": 2}, {"format": "other"}, {"arrays": "../arm.npz"}, {"arrays": "gone.npz"}, {"extra": 1},
+    {"version": 1}, {"version": 3}, {"skinning": "cubic"}, {"format": "other"}, {"arrays": "../arm.npz"},
+    {"arrays": "gone.npz"}, {"extra": 1},
     {"joints": ["a"]}, {"shapes": []}, {"layers": []},
 ], ids=str)
 def test_hostile_heads_are_refused(change, tmp_path):
