@@ -87,6 +87,15 @@ def curve_at(curve: Curve, frames: ArrayLike) -> Array:
     return out
 
 
+def value_range(curve: Curve) -> tuple[float, float]:
+    """About the lowest and the highest value from the first key to the last: of keys and eight places between them."""
+    frames = np.array([key.frame for key in curve.keys])
+    if len(frames) > 1:
+        frames = np.append(frames[:-1, None] + np.diff(frames)[:, None] * np.linspace(0.0, 1.0, 9)[:-1], frames[-1])
+    values = curve_at(curve, frames)
+    return float(values.min()), float(values.max())
+
+
 def _inside(curve: Curve, x: Array, y: Array, frames: Array) -> Array:
     segment = np.clip(np.searchsorted(x[:, 0], frames, side="right") - 1, 0, len(x) - 1)
     px, py = x[segment], y[segment]
