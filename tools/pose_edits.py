@@ -17,24 +17,32 @@ from numpy.typing import NDArray
 from core.document import Document, MeshObject, find_mesh, with_mesh
 from core.errors import UserError
 from core.formats.pose_json import read_sculpt
+from core.formats.sculpt_topology import check_topology
 from core.pose import edit_layers
+from core.pose.carry import carried_surface, mirrored_surface
 from core.pose.clip import onto_skeleton, resampled
-from core.pose.controls import rotation_dof
+from core.pose.constraints import constrained
+from core.pose.controls import rotation_dof, without_noise
 from core.pose.corrective import as_kind
 from core.pose.layers import space_dofs
+from core.pose.mirror_pose import mirror_of_rig, mirrored_space
 from core.pose.pose import SAME, Pose
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, Way
+from core.pose.refusal import Refusal
 from core.pose.rig import Constraint, Rig, all_clips
+from core.pose.sculpt.symmetry import opposites_by_axis, opposites_by_topology
 from core.pose.synthesis import evaluate
 
 NOTHING = Correctives()
-ROUNDED = 1e-6  # radians and metres: what samples of clips in single precision miss rest by
 Reading = Literal["swing", "twist", "swing-twist", "x", "y", "z"]
+Twins = Literal["refuse", "merge", "delete"]
+SPACE_OPTIONS = ("kernel", "kernel_version", "normalise", "affine", "clamp", "smoothing", "table", "weighted")
 
 
 def add_sculpt(
     document: Document, mesh_id: int, pose: Pose, target: NDArray[Any] | None = None,
-    falloffs: Mapping[str, Falloff] | None = None, dofs: Sequence[Dof] | None = None, **options: Any,
+    falloffs: Mapping[str, Falloff] | None = None, dofs: Sequence[Dof] | None = None, *, twins: Twins = "refuse",
+    **options: Any,
 ) -> Document:
     """The document with a sculpt at a pose, or anew where the pose has the name of one.
 
@@ -42,16 +50,29 @@ def add_sculpt(
     ----------
     target : (V, 3), the surface as sculpted, object space; as the layers give it when None.
     dofs : what a new space reads of the controls. options : other fields of a new space.
+    twins : what becomes of sculpts from which the pose cannot be told apart. They are named in a refusal; or "merge":
+        the new sculpt joins them at their pose, averaged; or "delete": they are deleted for it.
 
     Raises
     ------
     Refusal
         Naming the poses it cannot be told apart from.
     """
-    item, rig = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     have = item.correctives or NOTHING
+    pose = without_noise(rig, pose)
     surface = evaluate(item.mesh.points, rig, have, pose) if target is None else target
-    made = edit_layers.add_sculpt(item.mesh.points, rig, have, pose, surface, falloffs, dofs, **options)
+    try:
+        made = edit_layers.add_sculpt(item.mesh.points, rig, have, pose, surface, falloffs, dofs, **options)
+    except Refusal as refusal:
+        others = [name for name in refusal.poses if name not in (pose.name, REST_NAME)]
+        if twins == "refuse" or not others or refusal.reason == "coplanar":
+            raise
+        if twins == "delete":
+            for name in others:
+                document = remove_pose(document, mesh_id, name)
+            return add_sculpt(document, mesh_id, pose, surface, falloffs, dofs, twins=twins, **options)
+        return _merged_into(document, mesh_id, others[0], pose, surface)
     return with_mesh(document, item.replace(correctives=made.correctives))
 
 
@@ -61,10 +82,73 @@ def import_sculpt(document: Document, mesh_id: int, pose: Pose, path: str | Path
     Raises
     ------
     UserError
-        When the file is missing, damaged, or has another number of vertices; or as :func:`add_sculpt`.
+        When the file is missing, damaged, or has other vertices or faces (the sentence says how many, which face is
+        the first that differs, and what to do); or as :func:`add_sculpt`. Nothing is changed then.
     """
-    _, rig = _rigged(document, mesh_id)
-    return add_sculpt(document, mesh_id, pose, read_sculpt(Path(path), rig, f"pose {pose.name!r}"))
+    item, rig = rigged(document, mesh_id)
+    path = Path(path)
+    target = read_sculpt(path, rig, f"pose {pose.name!r}")
+    check_topology(path, item.mesh, rig)
+    return add_sculpt(document, mesh_id, pose, target)
+
+
+def restore_sculpt(
+    document: Document, mesh_id: int, pose: Pose, towards: str = "", amount: float = 1.0
+) -> Document:
+    """The document with the surface at a pose brought back by `amount` to the skin alone, or to another pose's shape.
+
+    What the mask covers stays.
+
+    Parameters
+    ----------
+    towards : a sculpted pose or one of the library, whose corrections are carried to this one; "" for the skin alone.
+    """
+    item, rig = rigged(document, mesh_id)
+    have, points = item.correctives or NOTHING, item.mesh.points
+    pose = without_noise(rig, pose)
+    if towards:
+        goal = carried_surface(points, rig, have, pose_named(item, towards), pose)
+    else:
+        goal = evaluate(points, rig, None, pose)
+    now = evaluate(points, rig, have, pose)
+    share = np.full(len(points), amount, np.float32) if item.mask is None else amount * (1.0 - item.mask)
+    surface = (now + share[:, None] * (goal - now)).astype(np.float32)
+    if np.array_equal(surface, now):
+        return document
+    return add_sculpt(document, mesh_id, pose.replace(name=sculpt_name(have, pose)), surface)
+
+
+def mirror_sculpt(
+    document: Document, mesh_id: int, name: str, way: Literal["topology", "axis"] = "topology",
+    source: Literal["+X", "-X"] = "+X",
+) -> Document:
+    """The document with a sculpt on the other side as well: at the mirrored pose, its image across X = 0.
+
+    A sculpt at a pose that is its own image becomes symmetric: the side `source` of it is copied.
+
+    Parameters
+    ----------
+    way : how opposite vertices are found: by how polygons are joined, or by where they are at rest.
+
+    Raises
+    ------
+    UserError
+        There is no such pose, or by topology the mesh is not connected alike on both sides.
+    """
+    item, rig = rigged(document, mesh_id)
+    have, points = _correctives(document, mesh_id), item.mesh.points
+    at, k = _place(document, mesh_id, name)
+    space, mirror = have.layers[at].space, mirror_of_rig(rig)
+    opposites = opposites_by_topology(item.mesh) if way == "topology" else opposites_by_axis(points)
+    sample = space.samples[k]
+    other, surface = mirrored_surface(
+        points, rig, have, sample.pose, mirror, opposites, 1 if source == "+X" else -1)
+    if other is sample.pose:
+        return add_sculpt(document, mesh_id, other, surface, sample.falloffs)
+    image = mirrored_space(space.replace(samples=(sample,), anchors=()), mirror)
+    options = {field: getattr(space, field) for field in SPACE_OPTIONS}
+    named = other.replace(name=sculpt_name(have, other))
+    return add_sculpt(document, mesh_id, named, surface, image.samples[0].falloffs, image.dofs, **options)
 
 
 def remove_pose(document: Document, mesh_id: int, name: str) -> Document:
@@ -81,7 +165,7 @@ def merge_poses(document: Document, mesh_id: int, names: Sequence[str]) -> Docum
 
 def move_pose(document: Document, mesh_id: int, name: str, pose: Pose) -> Document:
     """The document with a sculpt at another pose of the same controls; its corrections stay what they are."""
-    item, rig = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     at, _ = _place(document, mesh_id, name)
     moved = edit_layers.moved_pose(item.mesh.points, rig, _correctives(document, mesh_id), name, pose)
     return _changed(document, mesh_id, moved, at)
@@ -89,7 +173,7 @@ def move_pose(document: Document, mesh_id: int, name: str, pose: Pose) -> Docume
 
 def rename_pose(document: Document, mesh_id: int, name: str, to: str) -> Document:
     """The document with another name for a sculpted pose; UserError when it is taken."""
-    item, _ = _rigged(document, mesh_id)
+    item, _ = rigged(document, mesh_id)
     renamed = edit_layers.renamed_pose(_correctives(document, mesh_id), name, to)
     return with_mesh(document, item.replace(correctives=renamed))
 
@@ -138,7 +222,7 @@ def set_falloff(document: Document, mesh_id: int, name: str, control: str, fallo
 
 def set_reading(document: Document, mesh_id: int, layer: str, joint: str, reading: Reading) -> Document:
     """The document with a layer that reads swing, twist, both, or the turn about one axis of a joint."""
-    _, rig = _rigged(document, mesh_id)
+    _, rig = rigged(document, mesh_id)
     found = _layer(document, mesh_id, layer)[1]
     if joint not in found.space.controls:
         raise UserError(f"The layer {layer!r} does not read {joint!r}; it reads {', '.join(found.space.controls)}.")
@@ -152,42 +236,41 @@ def set_reading(document: Document, mesh_id: int, layer: str, joint: str, readin
 
 def set_way(document: Document, mesh_id: int, way: Way) -> Document:
     """The document with all layers interpolated in another way: the pose space, or plain shapes to compare with."""
-    item, _ = _rigged(document, mesh_id)
+    item, _ = rigged(document, mesh_id)
     return with_mesh(document, item.replace(correctives=as_kind(_correctives(document, mesh_id), way)))
 
 
 def hold_pose(document: Document, mesh_id: int, pose: Pose | None) -> Document:
-    """The document with a mesh held in a pose; None for the clip at the frame again.
+    """The document with a mesh held in a pose, constraints of the rig done; None for the clip at the frame again.
 
     Joints that are at rest but for the rounding of a clip's samples are at rest.
     """
-    item, _ = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     if pose is not None:
-        pose = pose.replace(
-            rotations={j: q for j, q in pose.rotations.items() if 2.0 * math.hypot(*q[:3]) > ROUNDED},
-            translations={j: t for j, t in pose.translations.items() if math.hypot(*t) > ROUNDED})
-    return with_mesh(document, item.replace(pose=pose))
+        pose = without_noise(rig, constrained(rig.skeleton, rig.constraints, pose))
+    return document if pose == item.pose else with_mesh(document, item.replace(pose=pose))
 
 
 def select_joints(document: Document, mesh_id: int, names: Sequence[str]) -> Document:
     """The document with joints of a mesh selected, the active one last; UserError when there is no such joint."""
-    item, rig = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     for name in names:
         if name not in rig.skeleton.names:
             raise UserError(f"There is no joint {name!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")
-    return with_mesh(document, item.replace(joint_selection=tuple(dict.fromkeys(names))))
+    wanted = tuple(dict.fromkeys(names))
+    return document if wanted == item.joint_selection else with_mesh(document, item.replace(joint_selection=wanted))
 
 
 def keep_pose(document: Document, mesh_id: int, pose: Pose) -> Document:
     """The document with a pose in the library; it takes the place of the one of its name."""
-    item, _ = _rigged(document, mesh_id)
+    item, _ = rigged(document, mesh_id)
     others = tuple(known for known in item.library if known.name != pose.name)
     return with_mesh(document, item.replace(library=(*others, pose)))
 
 
 def forget_pose(document: Document, mesh_id: int, name: str) -> Document:
     """The document without a pose of the library; UserError when there is none of that name."""
-    item, _ = _rigged(document, mesh_id)
+    item, _ = rigged(document, mesh_id)
     others = tuple(known for known in item.library if known.name != name)
     if len(others) == len(item.library):
         raise UserError(f"The library has no pose {name!r}; choose one from its list.")
@@ -208,7 +291,7 @@ def add_rig(document: Document, item: MeshObject) -> Document:
 
 def play_clip_file(document: Document, mesh_id: int, source: Rig) -> Document:
     """The document with a mesh playing the clip of another rig with joints of the same names, in no pose held."""
-    item, rig = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     if source.clip is None:
         raise UserError("That file has no motion; choose one with a clip.")
     clip = onto_skeleton(source.clip, source.skeleton, rig.skeleton)
@@ -221,7 +304,7 @@ def play_clip_file(document: Document, mesh_id: int, source: Rig) -> Document:
 
 def set_constraints(document: Document, mesh_id: int, constraints: Sequence[Constraint]) -> Document:
     """The document with other constraints of the joints of a rig; poses already made stay as they are."""
-    item, rig = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     try:
         return with_mesh(document, item.replace(rig=rig.replace(constraints=tuple(constraints))))
     except ValueError as error:
@@ -231,7 +314,8 @@ def set_constraints(document: Document, mesh_id: int, constraints: Sequence[Cons
 # what these share
 
 
-def _rigged(document: Document, mesh_id: int) -> tuple[MeshObject, Rig]:
+def rigged(document: Document, mesh_id: int) -> tuple[MeshObject, Rig]:
+    """A mesh and its rig; UserError when it has none."""
     item = find_mesh(document, mesh_id)
     if item.rig is None:
         raise UserError(f"{item.name} has no rig; import one with a skeleton or blend shapes.")
@@ -239,7 +323,7 @@ def _rigged(document: Document, mesh_id: int) -> tuple[MeshObject, Rig]:
 
 
 def _correctives(document: Document, mesh_id: int) -> Correctives:
-    return _rigged(document, mesh_id)[0].correctives or NOTHING
+    return rigged(document, mesh_id)[0].correctives or NOTHING
 
 
 def _place(document: Document, mesh_id: int, name: str) -> tuple[int, int]:
@@ -267,10 +351,29 @@ def _with_layer(document: Document, mesh_id: int, at: int, **changes: Any) -> Do
 
 def _changed(document: Document, mesh_id: int, correctives: Correctives, first: int) -> Document:
     """The document with correctives of which layers `first` and on are extracted anew, their sculpts held."""
-    item, rig = _rigged(document, mesh_id)
+    item, rig = rigged(document, mesh_id)
     made = edit_layers.refresh(item.mesh.points, rig, correctives, first, item.correctives)
     return with_mesh(document, item.replace(correctives=made.correctives))
 
+
+def _merged_into(document: Document, mesh_id: int, name: str, pose: Pose, surface: NDArray[Any]) -> Document:
+    """The document with the sculpt of that name averaged with a surface sculpted at (nearly) the same pose."""
+    item, rig = rigged(document, mesh_id)
+    have, points = _correctives(document, mesh_id), item.mesh.points
+    at, k = _place(document, mesh_id, name)
+    there = have.layers[at].space.samples[k]
+    now = evaluate(points, rig, have, there.pose)
+    added = np.asarray(surface) - evaluate(points, rig, None, pose) + evaluate(points, rig, None, there.pose)
+    return add_sculpt(document, mesh_id, there.pose, (0.5 * (now + added)).astype(np.float32), there.falloffs)
+
+
+def pose_named(item: MeshObject, name: str) -> Pose:
+    """A sculpted pose or one of the library; UserError when there is none of that name."""
+    samples = [s.pose for layer in (item.correctives or NOTHING).layers for s in layer.space.samples]
+    for pose in (*samples, *item.library):
+        if pose.name == name:
+            return pose
+    raise UserError(f"There is no pose {name!r}; choose a sculpted one, or one of the library.")
 
 
 def sculpt_name(correctives: Correctives | None, pose: Pose) -> str:

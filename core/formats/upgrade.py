@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 5
+FORMAT = 6
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -50,8 +50,14 @@ def shaped_tracks(raw: Raw) -> Raw:
     return raw
 
 
+def keyed_clips(raw: Raw) -> Raw:
+    """5 -> 6: clips know the samples that poses were keyed at; as there were none, nothing is to be changed."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
-UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks}
+UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {
+    1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks, 5: keyed_clips}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:

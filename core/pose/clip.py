@@ -114,7 +114,7 @@ def resampled(clip: Clip, frames_per_second: float, start: float | None = None) 
     return clip.replace(
         start=start, frames_per_second=float(frames_per_second), translations=mixed(clip.translations),
         rotations=freeze(without_flips(turned).astype(np.float32)), scales=mixed(clip.scales),
-        numbers=None if clip.numbers is None else mixed(clip.numbers),
+        numbers=None if clip.numbers is None else mixed(clip.numbers), keys=(),
     )
 
 

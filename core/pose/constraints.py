@@ -39,10 +39,11 @@ def _limited(one: Constraint, pose: Pose) -> Pose:
 
 
 def _following(skeleton: Skeleton, one: Constraint, pose: Pose) -> Pose:
+    """The pose with one joint led: from where its parent leaves it at rest, so that doing it twice is doing it once."""
     joint, target = skeleton.names.index(one.joint), skeleton.names.index(one.target or "")
-    if one.weight == 0.0 or (one.kind != "aim" and _below(skeleton, target, joint)):
+    if one.weight == 0.0 or _below(skeleton, target, joint):
         return pose  # what hangs from the joint goes where the joint goes
-    local = local_of_pose(skeleton, pose)
+    local = local_of_pose(skeleton, _let_go(one, pose))
     now, then = object_matrices(skeleton, local), object_matrices(skeleton, skeleton.rest)
     if one.kind == "point":
         parent = int(skeleton.parents[joint])
@@ -59,6 +60,22 @@ def _following(skeleton: Skeleton, one: Constraint, pose: Pose) -> Pose:
             turn = wanted @ polar_rotation(now[joint, :3, :3]).T
         local = turned_joint(skeleton, local, joint, partly(turn, one.weight))
     return pose_of_local(skeleton, local, pose.name, dict(pose.numbers))
+
+
+def _let_go(one: Constraint, pose: Pose) -> Pose:
+    """The pose without what the constraint decides; of an aim the joint keeps its twist about the axis."""
+    if one.kind == "point":
+        free: Pose = pose.replace(translations={j: t for j, t in pose.translations.items() if j != one.joint})
+        return free
+    rotations = {j: q for j, q in pose.rotations.items() if j != one.joint}
+    if one.kind == "aim" and one.joint in pose.rotations:
+        axis = normalized(one.axis)
+        q = pose.rotations[one.joint]
+        x, y, z = map(float, axis * float(axis @ q[:3]))
+        if math.hypot(x, y, z, q[3]) > 1e-9:
+            rotations[one.joint] = (x, y, z, q[3])
+    free = pose.replace(rotations=rotations)
+    return free
 
 
 def partly(turn: Array, share: float) -> Array:

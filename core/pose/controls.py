@@ -17,6 +17,7 @@ from core.transform import Array, normalized
 
 ROTATION_FALLOFF = math.pi / 3
 TRANSLATION_FALLOFF = 0.1  # metres
+NOISE = 1e-6  # radians, metres and units: what samples of clips in single precision miss rest by
 
 
 def twist_axes(skeleton: Skeleton) -> Array:
@@ -114,6 +115,16 @@ def dofs_of(rig: Rig, poses: Iterable[Pose], falloffs: dict[str, float] | None =
 def rests(rig: Rig) -> dict[str, float]:
     """Where the abstract controls rest that do not rest at 0."""
     return {name: at for name, at in resting_numbers(rig).items() if at != 0.0}
+
+
+def without_noise(rig: Rig, pose: Pose) -> Pose:
+    """The pose in which controls that miss rest only by the rounding of a clip's samples are at rest."""
+    at = resting_numbers(rig)
+    quiet: Pose = pose.replace(
+        rotations={j: q for j, q in pose.rotations.items() if 2.0 * math.hypot(*q[:3]) > NOISE},
+        translations={j: t for j, t in pose.translations.items() if math.hypot(*t) > NOISE},
+        numbers={n: v for n, v in pose.numbers.items() if abs(v - at.get(n, 0.0)) > NOISE})
+    return quiet
 
 
 def _check_joint(skeleton: Skeleton, joint: str) -> None:

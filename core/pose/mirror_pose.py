@@ -7,6 +7,7 @@ object space at rest, so it is right for every skeleton whose joints lie in mirr
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from core.pose.pose import Pose, Quaternion, Vector
 from core.pose.pose_space import Dof, Falloff, PoseLayer, PoseSample, PoseSpace
+from core.pose.rig import Rig
 from core.pose.rotation import polar_rotation
 from core.pose.skeleton import Skeleton
 from core.pose.skinning import object_matrices
@@ -33,6 +35,8 @@ class Mirror(NamedTuple):
     partners : (J,) int64, a joint of the middle is its own.
     across : 0, 1 or 2, the axis of object space that changes sign.
     turns : (J, 3, 3), rest rotation of each joint in object space. parents : (J, 3, 3), rest matrix of its parent.
+    controls : names of the abstract controls there are; one whose counterpart is not among them is its own. None for
+        whatever their names say.
     """
 
     skeleton: Skeleton
@@ -40,6 +44,7 @@ class Mirror(NamedTuple):
     across: int
     turns: Array
     parents: Array
+    controls: tuple[str, ...] | None = None
 
 
 def mirrored_name(name: str) -> str:
@@ -62,6 +67,20 @@ def mirror_of(skeleton: Skeleton, by: Literal["names", "place"] = "names", acros
     return Mirror(skeleton, partners, across, polar_rotation(rest[:, :3, :3]), parents)
 
 
+def mirror_of_rig(rig: Rig) -> Mirror:
+    """The mirror of a rig: by the names of its joints, by their places where no name knows a side."""
+    mirror = mirror_of(rig.skeleton)
+    if (mirror.partners == np.arange(len(mirror.partners))).all():
+        mirror = mirror_of(rig.skeleton, "place")
+    return mirror._replace(controls=tuple(control.name for control in rig.controls))
+
+
+def mirrored_control(mirror: Mirror, name: str) -> str:
+    """The abstract control of the other side."""
+    other = mirrored_name(name)
+    return other if mirror.controls is None or other in mirror.controls else name
+
+
 def mirrored_pose(pose: Pose, mirror: Mirror) -> Pose:
     """The pose of the other side: every joint and control does what its counterpart did."""
     place = {name: j for j, name in enumerate(mirror.skeleton.names)}
@@ -75,8 +94,22 @@ def mirrored_pose(pose: Pose, mirror: Mirror) -> Pose:
         other, _, move = _maps(mirror, place, name)
         x, y, z = map(float, move @ np.array(offset))
         translations[other] = (x, y, z)
-    numbers = {mirrored_name(name): value for name, value in pose.numbers.items()}
+    numbers = {mirrored_control(mirror, name): value for name, value in pose.numbers.items()}
     return Pose(name=mirrored_name(pose.name), rotations=rotations, translations=translations, numbers=numbers)
+
+
+def with_other_side(mirror: Mirror, pose: Pose, joints: Iterable[str]) -> Pose:
+    """The pose with the partners of `joints` posed as their mirror image; joints of the middle stay."""
+    place = {name: j for j, name in enumerate(mirror.skeleton.names)}
+    sided = {n for n in joints if n in place and int(mirror.partners[place[n]]) != place[n]}
+    partners = {mirror.skeleton.names[int(mirror.partners[place[n]])] for n in sided}
+    image = mirrored_pose(Pose(
+        rotations={n: q for n, q in pose.rotations.items() if n in sided},
+        translations={n: t for n, t in pose.translations.items() if n in sided}), mirror)
+    both: Pose = pose.replace(
+        rotations={**{n: q for n, q in pose.rotations.items() if n not in partners}, **image.rotations},
+        translations={**{n: t for n, t in pose.translations.items() if n not in partners}, **image.translations})
+    return both
 
 
 def mirrored_space(space: PoseSpace, mirror: Mirror) -> PoseSpace:
@@ -133,7 +166,7 @@ def _maps(mirror: Mirror, place: dict[str, int], name: str) -> tuple[str, Array,
     flip = np.eye(3)
     flip[mirror.across, mirror.across] = -1.0
     if name not in place:
-        return mirrored_name(name), flip, flip
+        return mirrored_control(mirror, name), flip, flip
     j = place[name]
     p = int(mirror.partners[j])
     turn = mirror.turns[p].T @ flip @ mirror.turns[j]

@@ -61,7 +61,8 @@ class Constraint(Record):
     kind : "limit" keeps its XYZ angles within `low` .. `high`, radians relative to rest; "aim" turns it so that its
         own `axis` points at the origin of `target`; "point" moves its origin to where `target` is, as far from it as
         at rest; "orient" turns it in object space as `target` is turned from its rest.
-    weight : how much of it is done, 0 .. 1; a limit always holds whole.
+    weight : how much of it is done, 0 .. 1: of the way from where the parent carries the joint at rest to where the
+        target wants it (0 leaves the joint free); a limit always holds whole.
     """
 
     joint: str

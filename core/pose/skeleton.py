@@ -43,6 +43,7 @@ class Clip(Record, kw_only=True):
     rotations : (F, J, 4) float32, quaternions x, y, z, w.
     scales : (F, J, 3) float32.
     number_names : of abstract controls that move too. numbers : (F, N) float32, their values, None without names.
+    keys : ascending, the samples somebody keyed a pose at (``core.pose.keying``); empty for motion that was read.
     """
 
     name: str = "clip"
@@ -53,6 +54,7 @@ class Clip(Record, kw_only=True):
     scales: np.ndarray
     number_names: tuple[str, ...] = ()
     numbers: np.ndarray | None = None
+    keys: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         text(self, "name")
@@ -70,6 +72,8 @@ class Clip(Record, kw_only=True):
             raise ValueError("Clip.numbers must have a column for each of its names, or be None without any")
         if self.numbers is not None:
             column(self, "numbers", np.float32, (frames, len(self.number_names)))
+        if any(not 0 <= key < frames for key in self.keys) or list(self.keys) != sorted(set(self.keys)):
+            raise ValueError("Clip.keys must be samples of the clip, ascending")
 
     @property
     def end(self) -> float:

@@ -11,9 +11,8 @@ from core.errors import UserError
 from core.field import field
 from core.overlay import Circle, Overlays, Polyline, Tone
 from core.pose.constraints import constrained
-from core.pose.mirror_pose import mirror_of, mirrored_pose
+from core.pose.mirror_pose import mirror_of_rig, with_other_side
 from core.pose.pose import Pose, local_of_pose
-from core.pose.rig import Rig
 from core.pose.rotation import polar_rotation
 from core.pose.skinning import object_matrices
 from core.record import Record
@@ -109,24 +108,6 @@ def towards_eye(ground: PoseGround, place: Array) -> Array:
     return -direction
 
 
-def with_other_side(rig: Rig, before: Pose, pose: Pose, joints: tuple[str, ...]) -> Pose:
-    """The pose with the partners of `joints` posed as their mirror image; joints of the middle stay."""
-    mirror = mirror_of(rig.skeleton)
-    place = {name: j for j, name in enumerate(rig.skeleton.names)}
-    sided = {n for n in joints if n in place and int(mirror.partners[place[n]]) != place[n]}
-    changed = {n for n in sided if pose.rotations.get(n) != before.rotations.get(n)
-               or pose.translations.get(n) != before.translations.get(n)}
-    part = Pose(name=pose.name, rotations={n: q for n, q in pose.rotations.items() if n in changed},
-                translations={n: t for n, t in pose.translations.items() if n in changed})
-    other = mirrored_pose(part, mirror)
-    partners = {rig.skeleton.names[int(mirror.partners[place[n]])] for n in changed}
-    kept_turns = {n: q for n, q in pose.rotations.items() if n not in partners}
-    kept_moves = {n: t for n, t in pose.translations.items() if n not in partners}
-    mirrored: Pose = pose.replace(
-        rotations={**kept_turns, **other.rotations}, translations={**kept_moves, **other.translations})
-    return mirrored
-
-
 class PosingStroke:
     """A press that picks a joint, or a drag on a handle that poses the selected ones."""
 
@@ -147,7 +128,10 @@ class PosingStroke:
         if self.ground.mirrored:
             if matter.pose is None:
                 return matter
-            return matter._replace(pose=with_other_side(rig, self.ground.pose, matter.pose, self.touched()))
+            before, now = self.ground.pose, matter.pose
+            changed = [n for n in self.touched() if now.rotations.get(n) != before.rotations.get(n)
+                       or now.translations.get(n) != before.translations.get(n)]
+            return matter._replace(pose=with_other_side(mirror_of_rig(rig), now, changed))
         pose = self.posed(pointers[-1])
         if pose is not None:
             pose = constrained(rig.skeleton, rig.constraints, pose)

@@ -11,7 +11,7 @@ from core.errors import UserError
 from core.field import field
 from core.mesh.edges import edge_vertices
 from core.mesh.mesh import Mesh
-from core.pose.mirror_pose import mirror_of
+from core.pose.mirror_pose import mirror_of_rig
 from core.pose.sculpt.ring import Ring
 from core.pose.skeleton import SkinWeights
 from core.pose.weights import painted, smoothed
@@ -58,7 +58,7 @@ class Weights(Tool[WeightParams]):
             raise UserError("No joint is selected; select the joint whose weights you want to paint.")
         joint = names.index(selected[-1])
         if ground.opposites is not None:
-            joint = int(mirror_of(ground.rig.skeleton).partners[joint])
+            joint = int(mirror_of_rig(ground.rig).partners[joint])
         if names[joint] in ground.item.locked_joints:
             raise UserError(f"The weights of {names[joint]} are locked; unlock the joint to paint them.")
         return WeightStroke(self.params, ground, joint)

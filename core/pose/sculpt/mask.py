@@ -42,6 +42,18 @@ def invert_mask(mask: Mask) -> Mask:
     return np.float32(1.0) - mask
 
 
+def grown_mask(surface: SculptSurface, mask: Mask) -> Mask:
+    """What is protected reaches one ring of neighbours farther: every site takes the most of those joined to it."""
+    out = mask.copy()
+    np.maximum.at(out, np.repeat(np.arange(len(mask)), np.diff(surface.starts)), mask[surface.neighbours])
+    return _follow(surface, out)
+
+
+def shrunk_mask(surface: SculptSurface, mask: Mask) -> Mask:
+    """What is protected gives way by one ring of neighbours: the reverse of :func:`grown_mask`."""
+    return invert_mask(grown_mask(surface, invert_mask(mask)))
+
+
 def _follow(surface: SculptSurface, mask: Mask) -> Mask:
     mask[surface.followers] = mask[surface.site[surface.followers]]
     return mask
