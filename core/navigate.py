@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from core.camera import Camera, frame_points, look_at, pixel_scale
+from core.gate import AROUND
 from core.record import freeze
 from core.transform import any_perpendicular, normalized, rotation
 
@@ -103,9 +104,10 @@ def frame(camera: Camera, points_in_world: ArrayLike, aspect: float) -> Camera:
 def whole_in(camera: Camera, aspect: float, window_aspect: float) -> Camera:
     """A camera whose own picture has `aspect`, opened so far that a window of another shape shows all of that picture.
 
-    A narrower window keeps the picture's width, a wider one its height; what is beside it is seen, too.
+    A narrower window keeps the picture's width, a wider one its height; what is beside it is seen, too, and a little
+    more all around.
     """
-    more = max(aspect / window_aspect, 1.0)
+    more = max(aspect / window_aspect, 1.0) * AROUND
     if camera.orthographic:
         return camera.replace(height=float(np.clip(camera.height * more, NEAREST, FARTHEST)))
     half = math.atan(more * math.tan(0.5 * camera.field_of_view))

@@ -10,8 +10,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# what a mark means; the viewport chooses the colour of the theme
-Tone = Literal["plain", "faint", "accent", "good", "trouble", "selected"]
+# what a mark means, x, y and z that it is of an axis; the viewport chooses the colour of the theme
+Tone = Literal["plain", "faint", "accent", "good", "trouble", "selected", "x", "y", "z"]
 
 
 class Circle(NamedTuple):
@@ -44,13 +44,24 @@ class Marker(NamedTuple):
 
 
 class Label(NamedTuple):
-    """Words at (x, y), their left lower corner, in the size of the window's text."""
+    """Words at (x, y), their left lower corner, in the size of the window's text; `plate` darkens what is behind."""
 
     x: float
     y: float
     words: str
     tone: Tone = "plain"
+    plate: bool = False
 
 
-Overlay = Circle | Polyline | Marker | Label
+class Fill(NamedTuple):
+    """Darkness over a rectangle, from (left, top) to (right, bottom), in pixels."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+    opacity: float = 0.5
+
+
+Overlay = Circle | Polyline | Marker | Label | Fill
 Overlays = tuple[Overlay, ...]

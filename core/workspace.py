@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from core.camera import Camera
 from core.field import field
+from core.gate import Gate
 from core.record import Record, number, text
 
 SHADINGS = ("shaded", "matcap", "wire", "lines")
@@ -48,6 +49,7 @@ class ViewOptions(Record):
     shading : of meshes, one of SHADINGS. map : name of the map shown as colours on the skin, or None.
     isolated : ids of the only meshes shown (with their grooms), empty for all; ghosted : ids shown translucent.
     background : path of an image behind everything, or None.
+    gate : of a film camera, or None. safe_areas : whether it shows where action and titles are safe.
     """
 
     shading: str = "shaded"
@@ -62,6 +64,9 @@ class ViewOptions(Record):
     ghosted: tuple[int, ...] = ()
     background: str | None = None
     references: tuple[Reference, ...] = ()
+    gate: Gate | None = None
+    gate_shown: bool = True
+    safe_areas: bool = False
 
     def __post_init__(self) -> None:
         if self.shading not in SHADINGS:

@@ -10,21 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.camera import Camera
-from core.overlay import Circle, Label, Marker, Overlay, Polyline
+from core.overlay import Circle, Fill, Label, Marker, Overlay, Polyline
 from viewport.shaders import program, set_uniforms
 
 Byte3 = tuple[int, int, int]
 TONES: Mapping[str, Byte3] = {
     "plain": (0xE4, 0xE6, 0xE9), "faint": (0x8B, 0x90, 0x98), "accent": (0xE0, 0xA4, 0x58), "good": (0x86, 0xB0, 0x81),
-    "trouble": (0xDB, 0x62, 0x59), "selected": (0xFF, 0xDC, 0x8C),
+    "trouble": (0xDB, 0x62, 0x59), "selected": (0xFF, 0xDC, 0x8C), "x": (0xF0, 0x5A, 0x50), "y": (0x7C, 0xC8, 0x6E),
+    "z": (0x5A, 0xA0, 0xF5),
 }  # fmt: skip
 HALO = (0.04, 0.04, 0.045, 0.42)  # under every line, so that it is seen on light fur and on dark ground
 HALO_WIDTH = 1.0  # pixels on each side
 MARKER_WIDTH = 1.5
 DASH = (6.0, 5.0)
+PLATE, PLATE_HALF, LETTER = (0.04, 0.04, 0.045, 0.72), 9.0, 7.0  # behind words; half its height, width of a letter
 AXIS_COLORS: tuple[Byte3, Byte3, Byte3] = ((0xDB, 0x62, 0x59), (0x86, 0xB0, 0x81), (0x62, 0x95, 0xD6))
 AXIS_LENGTH, AXIS_MARGIN = 26.0, 44.0  # pixels
 MARK = 12  # floats: ends (4), shape (4), colour (4); see mark.vert
+FILLED, DARK = -1.0, (0.02, 0.02, 0.022)  # in place of a radius: a box; and its colour
 MARKS_AT_ONCE = 1 << 14
 
 
@@ -39,10 +42,15 @@ class Words(NamedTuple):
 
 
 def marks(overlays: Sequence[Overlay], tones: Mapping[str, Byte3] = TONES, scale: float = 1.0) -> NDArray[np.float32]:
-    """(K, MARK) float32: every line and circle of the overlays with its halo before it; widths times `scale`."""
+    """(K, MARK) float32: every line and circle with its halo before it, plates of words; widths times `scale`."""
     rows: list[list[float]] = []
     for overlay in overlays:
+        if isinstance(overlay, Fill):
+            rows.append([*overlay[:4], FILLED, 0.0, -1.0, 0.0, *DARK, overlay.opacity])
+            continue
         if isinstance(overlay, Label):
+            if overlay.plate:
+                rows.append(_plate(overlay, scale))
             continue
         half = 0.5 * scale * (MARKER_WIDTH if isinstance(overlay, Marker) else overlay.width)
         color = [c / 255.0 for c in tones.get(overlay.tone, tones["plain"])] + [1.0]
@@ -50,6 +58,12 @@ def marks(overlays: Sequence[Overlay], tones: Mapping[str, Byte3] = TONES, scale
         rows += [[*s[:5], half + HALO_WIDTH * scale, s[5], 0.0, *HALO] for s in shapes]
         rows += [[*s[:5], half, s[5], 0.0, *color] for s in shapes]
     return np.asarray(rows, np.float32).reshape(-1, MARK)
+
+
+def _plate(label: Label, scale: float) -> list[float]:
+    """A thick dark line behind words, about as long as they are."""
+    y, end = label.y - 4.5 * scale, label.x + LETTER * scale * len(label.words)
+    return [label.x, y, max(end, label.x), y, 0.0, PLATE_HALF * scale, -1.0, 0.0, *PLATE]
 
 
 def _shapes(overlay: Circle | Polyline | Marker) -> list[list[float]]:

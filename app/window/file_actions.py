@@ -21,6 +21,7 @@ from core.formats import camera_file, curve_file
 from core.formats.camera_file import FileCamera, read_cameras
 from core.formats.mesh_file import MeshFile, read_mesh
 from core.formats.project import write_project
+from core.gate import gate_of
 from core.groom.grow import grow
 from core.navigate import whole_in
 from core.workspace import Reference
@@ -183,6 +184,8 @@ class FileActions:
 
     def _look_through(self, found: FileCamera) -> None:
         width, height = self._window.viewport.pixels()
+        self._desk.set_workspace(view=self._desk.workspace.view.replace(
+            gate=gate_of(found.camera, found.aspect), gate_shown=True))
         self._window.look(whole_in(found.camera, found.aspect, width / height))
         shift = " Its picture is shifted aside in the file; here it is centred." if found.off_centre else ""
         self._desk.said.emit(f"This is what {found.name} sees at frame {self._desk.workspace.frame:g}.{shift}")

@@ -60,6 +60,7 @@ from core.camera import Camera
 from core.document import Document
 from core.errors import UserError
 from core.formats.journal import Journal
+from core.gate import HD, gate_within
 from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
@@ -238,7 +239,10 @@ class MainWindow(QMainWindow):
 
     def make_playblast(self) -> None:
         """Ask for a playblast beside the work."""
-        dialog = PlayblastDialog(self.desk, self.viewport.draw_frame, self.viewport.pixels(), self)
+        (width, height), view = self.viewport.pixels(), self.desk.workspace.view
+        if view.gate is not None and view.gate_shown:
+            height = max(2 * round(0.5 * width / view.gate.aspect), 16)
+        dialog = PlayblastDialog(self.desk, self.viewport.draw_frame, (width, height), self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.show()
 
@@ -261,6 +265,13 @@ class MainWindow(QMainWindow):
     def toggle_projection(self) -> None:
         """A lens or parallel rays."""
         self.viewport.eye.toggle_projection()
+
+    def toggle_gate(self) -> None:
+        """Show or hide the film gate; the first time one of the present view."""
+        view, (width, height) = self.desk.workspace.view, self.viewport.pixels()
+        shown = view.replace(gate_shown=not view.gate_shown) if view.gate is not None else view.replace(
+            gate=gate_within(self.viewport.eye.camera, HD, width / height), gate_shown=True)
+        self.desk.set_workspace(view=shown)
 
     def scale_density(self, factor: float) -> None:
         """More or fewer hairs while the hand moves."""

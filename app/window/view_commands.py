@@ -110,6 +110,11 @@ def _unhide(window: Window) -> None:
     window.desk.set_workspace(view=view.replace(isolated=(), ghosted=()))
 
 
+def _has_gate(desk: Desk) -> bool:
+    view = desk.session.workspace.view
+    return view.gate is not None and view.gate_shown
+
+
 def _no_background(window: Window) -> None:
     window.desk.set_workspace(view=window.desk.session.workspace.view.replace(background=None, references=()))
 
@@ -156,6 +161,15 @@ VIEW: tuple[Command, ...] = (
         "Looks through a camera of USD, Alembic or glTF at this frame; all of its picture is seen.",
         lambda w: w.camera_from_file(), "core.formats.camera_file.read_cameras", enabled=_needs_something,
         icon="camera", words="shot match import lens layout"),
+    Command(
+        "view.gate", "Film gate",
+        "Darkens what the film camera does not take and gives playblasts its shape; without a camera's own it is 16:9.",
+        lambda w: w.toggle_gate(), "core.gate.gate_of", enabled=_needs_view, checked=_has_gate, scope="viewport",
+        words="camera frame mask aspect letterbox resolution"),
+    Command(
+        "view.safe_areas", "Safe areas", "Draws where action and titles are safe on every screen inside the film gate.",
+        switch("safe_areas"), _OPTIONS, checked=is_on("safe_areas"), scope="viewport",
+        words="title action gate camera"),
     *(
         Command(
             f"view.store_{n}", f"Keep view {n}", f"Keeps how you look now as view {n}, saved with the project.",

@@ -44,9 +44,11 @@ from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_p
 from app.window.theme import look_of, text_font
 from core.document import Document
 from core.errors import UserError
+from core.gate import seen_through
 from core.overlay import Overlays
 from core.workspace import Workspace
 from tools.tool import Pointer, Sight
+from viewport.gate import gate_marks
 from viewport.hud import Byte3
 from viewport.live_scene import Done, Job
 from viewport.view import HudLine
@@ -133,6 +135,8 @@ class Viewport(QOpenGLWindow):
     def draw_frame(self, frame: float, size: tuple[int, int]) -> Iterator[object]:
         """Draw a finished frame at a size in short slices; the last item is (height, width, 3) uint8 sRGB.
 
+        It is what the film gate takes, where it is shown.
+
         The picture on the screen stands still meanwhile.
         """
         picture, ctx = self.picture, self._ctx
@@ -140,7 +144,11 @@ class Viewport(QOpenGLWindow):
             raise UserError("Nothing can be drawn without OpenGL 3.3.")
         self._lent += 1
         try:
-            for slice_of in picture.frame_at(frame, self.eye.camera, size):
+            view = self.desk.workspace.view
+            camera = self.eye.camera
+            if view.gate is not None and view.gate_shown:
+                camera = seen_through(view.gate, camera)
+            for slice_of in picture.frame_at(frame, camera, size):
                 yield slice_of
                 self.makeCurrent()
             texture = ctx.texture(size, 4)
@@ -224,6 +232,8 @@ class Viewport(QOpenGLWindow):
             self.frames += 1
             if took is not None:
                 self.picture.density.frame(took)
+            if self.picture.view.opening:
+                self.redraw()
         self.painted.emit()
         if self.picture is not None and not self.picture.settled and not self._rest.isActive() and not self._busy():
             self._rest.start(CALM_MS)
@@ -259,7 +269,8 @@ class Viewport(QOpenGLWindow):
 
     def _overlays(self) -> Overlays:
         gestures, pointer = self.gestures, self._pointer
-        under = skeleton_of(self.desk, self.eye.camera, self.pixels(), self.devicePixelRatio())
+        under = gate_marks(self.desk.workspace.view, self.eye.camera, self.pixels(), self.devicePixelRatio())
+        under += skeleton_of(self.desk, self.eye.camera, self.pixels(), self.devicePixelRatio())
         if pointer is None or isinstance(gestures.drag, CameraDrag):
             return under + gestures.overlays()
         if isinstance(gestures.drag, BrushDrag):

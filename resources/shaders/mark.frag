@@ -8,6 +8,10 @@ layout(location = 0) out vec4 out_color;
 
 void main()
 {
+    if (shape.x < 0.0) {
+        out_color = vec4(color.rgb, 1.0) * color.a;
+        return;
+    }
     vec2 line = ends.zw - ends.xy, from = at - ends.xy;
     float length2 = dot(line, line);
     float part = length2 > 0.0 ? clamp(dot(from, line) / length2, 0.0, 1.0) : 0.0;

@@ -1,7 +1,7 @@
-// A line from a to b with round ends, or a circle about a: a box around it, in pixels with y down.
+// A line from a to b with round ends, a circle about a, or the box from a to b: a box around it, in pixels, y down.
 uniform vec2 picture_size;
 in vec4 in_ends;       // a, b
-in vec4 in_shape;      // radius (0 for a line), half width, way along a dashed line before a or -1, unused
+in vec4 in_shape;      // radius (0 for a line, -1 for a box, whose width is 0), half width, way along a dashed line before a or -1, unused
 in vec4 in_color;
 out vec2 at;
 flat out vec4 ends;

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.camera import Camera, look_at
-from core.overlay import Circle, Label, Marker, Polyline
+from core.overlay import Circle, Fill, Label, Marker, Polyline
 from viewport.context import collect
 from viewport.hud import KEPT_WORDS, ScreenImages, plain_text
 from viewport.overlay_drawing import HALO_WIDTH, TONES, MarkDrawing, Words, axes_marks, labels, marks
@@ -142,3 +142,19 @@ def test_letters_without_a_window_are_legible():
     assert (image[..., 3] > 100).mean() > 0.05
     assert plain_text("", 12.0, (1, 2, 3)).shape[1] >= 1
     assert [word.words for word in labels([Label(1, 2, "a"), Circle(0, 0, 1)])] == ["a"]
+
+
+def test_a_fill_darkens_its_box_alone(ctx):
+    color = ctx.texture((W, H), 4)
+    target = ctx.framebuffer([color])
+    drawing = MarkDrawing(ctx)
+    target.use()
+    target.clear(1.0, 1.0, 1.0, 1.0)
+    drawing.draw(marks([Fill(19.5, 29.5, 99.5, 49.5, 0.6)]), (W, H))
+    image = np.frombuffer(target.read(components=4), np.uint8).reshape(H, W, 4)[::-1, :, 1] / 255.0
+    inside = np.zeros((H, W), bool)
+    inside[30:50, 20:100] = True
+    assert (image[~inside] == 1.0).all()
+    np.testing.assert_allclose(image[inside], 0.4 + 0.6 * 0.02, atol=0.01)
+    for thing in (drawing, target, color):
+        thing.release()

@@ -6,9 +6,12 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PySide6.QtWidgets import QFileDialog, QMenu
 
+from app.window.playblast import PlayblastDialog
 from core.camera import project
+from core.gate import gate_box
 from tests.window.hand import Hand
 
 LENS = {"type": "perspective", "perspective": {"yfov": 0.4, "aspectRatio": 2.39, "znear": 0.1}}
@@ -37,8 +40,28 @@ def test_the_command_asks_for_a_file_and_shows_all_that_its_camera_sees(hand: Ha
     tall = np.tan(0.2)
     corners = [(x * tall * 2.39, 0.3 + y * tall, 1.0) for x in (-1, 1) for y in (-1, 1)]
     seen = project(window.desk.workspace.cameras[0], corners, width, height).xy
-    assert np.allclose(seen[:, 0], [-0.5, -0.5, width - 0.5, width - 0.5], atol=0.01)
-    assert ((seen[:, 1] > 0) & (seen[:, 1] < height)).all()
+    assert ((seen > 0) & (seen < [width, height])).all()
+    assert np.ptp(seen[:, 0]) > 0.9 * width
+    gate = window.desk.workspace.view.gate
+    assert gate is not None
+    box = gate_box(gate, window.desk.workspace.cameras[0], width, height)
+    assert box is not None
+    assert np.allclose([seen.min(axis=0), seen.max(axis=0)], [box[:2], box[2:]], atol=0.01)
+
+    def brightness(y: float) -> float:
+        return hand.view.grabFramebuffer().pixelColor(width // 2, round(y)).lightnessF()
+
+    outside, inside = 0.5 * box.top, box.top + 0.5 * box.top
+    dark, ground = brightness(outside), brightness(inside)
+    window.commands.run("view.gate")
+    hand.rest()
+    assert dark < 0.6 * brightness(outside)
+    assert brightness(inside) == ground
+    window.commands.run("view.gate")
+    window.make_playblast()
+    dialog = next(d for d in window.findChildren(PlayblastDialog) if d.isVisible())
+    assert dialog.width_box.value() / dialog.height_box.value() == pytest.approx(2.39, rel=0.01)
+    dialog.close()
 
 
 def test_several_cameras_are_chosen_from_by_name(hand: Hand, tmp_path: Path) -> None:
