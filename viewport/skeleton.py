@@ -1,4 +1,4 @@
-"""A skeleton over the picture: bones as lines, joints as rings, those that are selected in their own colour."""
+"""A skeleton over the picture: bones as kites that point to the child, joints as rings, the selected in a colour."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.camera import Camera, clip_from_world
-from core.overlay import Circle, Overlay, Overlays, Polyline
+from core.overlay import Circle, Overlay, Overlays, Polyline, Tone
 from core.pose.pose import Pose, local_of_pose
 from core.pose.skeleton import Skeleton
 from core.pose.skinning import object_matrices
 
-JOINT, CHOSEN = 3.0, 5.0  # radii, pixels of the window
+JOINT, CHOSEN = 3.5, 5.5  # radii, pixels of the window
+WIDE, SHOULDER = 5.0, 0.14  # of a bone: half its width in pixels, and the part of its length where it is widest
 MOST = 400  # joints: of larger skeletons only the bones of selected joints are drawn
 
 
@@ -43,7 +44,8 @@ def skeleton_marks(
     marks: list[Overlay] = []
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0 and drawn[joint] and seen[parent]:
-            marks.append(Polyline(pixels[[parent, joint]], "selected" if chosen[parent] else "faint", 1.5))
+            tone: Tone = "selected" if chosen[parent] else "faint"
+            marks.append(Polyline(_kite(pixels[parent], pixels[joint], ratio), tone, 1.5, closed=True))
     for joint in np.flatnonzero(drawn):
         x, y = map(float, pixels[joint])
         if chosen[joint]:
@@ -51,3 +53,13 @@ def skeleton_marks(
         else:
             marks.append(Circle(x, y, JOINT * ratio, "plain", 1.0))
     return tuple(marks)
+
+
+def _kite(start: NDArray[np.float64], end: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
+    """The outline (4, 2) of a bone in pixels: widest near its start, so that it shows which way it goes."""
+    along = end - start
+    length = float(np.linalg.norm(along))
+    wide = min(WIDE * ratio, 0.2 * length)
+    side = np.array([-along[1], along[0]]) * (wide / max(length, 1e-9))
+    foot = start + SHOULDER * along
+    return np.array([start, foot + side, end, foot - side])

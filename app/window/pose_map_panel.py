@@ -253,10 +253,10 @@ class MapCanvas(QWidget):
             words = "distances in falloffs"
         else:
             words = "   ".join(
-                f"{arrow} {axis.name} {_shown(axis, low)} … {_shown(axis, high)}"
+                f"{arrow} {_shown(axis, low)} … {_shown(axis, high)}"
                 for arrow, axis, low, high in zip("→↑", self.chart.axes, self.chart.low, self.chart.high, strict=True))
         metrics, side = painter.fontMetrics(), 54.0
-        room = below.width() - (side + 34 if self._heat is not None else 0)
+        room = below.width() - (side + 60 if self._heat is not None else 0)
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter,
                          metrics.elidedText(words, Qt.TextElideMode.ElideRight, round(room)))
         if self._heat is None:

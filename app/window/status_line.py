@@ -134,7 +134,7 @@ def hint(desk: Desk, keymap: Keymap) -> str:
         return f"{desk.jobs.running[0].name}: this takes a moment. Cancel at the right ends it."
     if not desk.document.meshes:
         return "Open a mesh or a project, or drop a file here."
-    parts = [desk.session.tool.hint] if desk.document.grooms else []
+    parts = [desk.session.tool.hint] if desk.document.grooms or desk.session.tool.craft == "pose" else []
     parts += [f"{_written(keys)}: {words}" for brush, words in (("size", "size"), ("strength", "strength"))
               if (keys := keymap.brush.get(brush))]  # type: ignore[call-overload] # these are names of the record
     parts += [f"{_written(keys)}: {words}" for action, words in ACTIONS

@@ -10,6 +10,7 @@ from core.document import Document, MeshObject
 from core.groom.region import View
 from core.leaves import same_bits
 from core.mesh.mesh import Mesh
+from core.overlay import Label, Polyline
 from core.pose.pose import REST, local_of_pose
 from core.pose.rig import Constraint
 from core.pose.rotation import polar_rotation
@@ -174,7 +175,7 @@ def test_the_elbow_turns_and_the_hand_stays():
 
 def test_limits_hold_while_a_ring_is_dragged():
     limit = Constraint(joint="fore", kind="limit", low=(-0.2, -0.2, -0.2), high=(0.2, 0.2, 0.2))
-    s = posing("rotate", "fore", constraints=(limit,))
+    s = posing("rotate", "fore", constraints=(limit,), size=80.0)
     drag(s, around(pixel(world(s)["fore"][:3, 3]), 100.0, 0.0, 2.0))
     q = s.document.meshes[0].pose.rotations["fore"]
     assert 2 * math.acos(min(1.0, abs(q[3]))) < 0.36
@@ -203,7 +204,7 @@ def test_the_pose_is_relative_to_rest_and_undo_takes_it_back():
 
 
 def test_replayed_it_is_the_same_to_the_bit():
-    s = posing("rotate", "fore")
+    s = posing("rotate", "fore", size=80.0)
     made = []
     s.hand.recorded = made.append
     drag(s, around(pixel(world(s)["fore"][:3, 3]), 100.0, 0.3, 1.4))
@@ -211,3 +212,32 @@ def test_replayed_it_is_the_same_to_the_bit():
     s.undo()
     s.hand.replay(made[0])
     assert same_bits(s.document.meshes[0].pose, first)
+
+
+def test_the_held_ring_shows_the_sector_and_says_the_angle():
+    s = posing("rotate", "fore", axes="world", size=80.0)
+    centre = pixel(world(s)["fore"][:3, 3])
+    places = around(centre, 80.0, 0.4, 0.4 + math.radians(50))
+    s.hand.press(SIGHT, Pointer(*places[0]))
+    for place in places[1:]:
+        s.hand.move((Pointer(*place),))
+    marks = s.hand.hover(SIGHT, Pointer(*places[-1]))
+    label = next(m for m in marks if isinstance(m, Label))
+    assert label.words.startswith("Z ")
+    said = float(label.words[2:-1])
+    q = s.document.meshes[0].pose.rotations["fore"]
+    assert abs(said) == pytest.approx(math.degrees(2 * math.acos(min(abs(q[3]), 1.0))), abs=0.06)
+    arc = max((m for m in marks if isinstance(m, Polyline)), key=lambda m: m.width).points - centre
+    ends = np.degrees(np.arctan2(arc[:, 1], arc[:, 0]))
+    assert np.linalg.norm(arc, axis=1) == pytest.approx(80.0, abs=1.0)
+    assert abs(ends[-1] - ends[0]) == pytest.approx(50.0, abs=1.0)
+
+
+@pytest.mark.parametrize("name", ["rotate", "move"])
+def test_handles_have_the_colours_and_names_of_axes_and_the_pointed_joint_its_name(name):
+    s = posing(name, "fore", axes="world", size=30.0)
+    x, y = pixel(world(s)["hand"][:3, 3])
+    marks = s.hand.hover(SIGHT, Pointer(x, y))
+    named = {(m.words, m.tone) for m in marks if isinstance(m, Label)}
+    assert {("X", "x"), ("Y", "y"), ("Z", "z")} < named
+    assert "hand" in {words for words, _ in named}

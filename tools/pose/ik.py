@@ -17,9 +17,9 @@ from tools.pose.posing import (
     Joints,
     ManipulatorParams,
     PosingStroke,
-    dots,
     joint_under,
     joints_of,
+    meant,
     selected,
     selected_with,
     towards_eye,
@@ -68,10 +68,10 @@ class Ik(Tool[IkParams]):
         return IkStroke(ground, selected_with(selection, joint, add=False), joints, chain, self.params, pointer)
 
     def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
-        """Joints and bones, and the chain that a press would pose."""
+        """The chain that a press would pose, and the joint that leads it."""
         joints = joints_of(ground, ground.pose)
         joint = joint_under(ground, joints, pointer)
-        drawn = dots(ground, joints, ground.item.joint_selection)
+        drawn = meant(ground, joints, joint)
         if joint is None:
             return drawn
         try:
@@ -120,7 +120,7 @@ class IkStroke(PosingStroke):
         joints = joints_of(self.ground, self.pose)
         place, _ = self.ground.view.pixels(self.goal)
         goal = Marker(float(place[0]), float(place[1]))
-        return (*dots(self.ground, joints, self.selection), *chain_overlay(self.ground, joints, self.chain), goal)
+        return (*chain_overlay(self.ground, joints, self.chain), goal)
 
 
 def chain_overlay(ground: PoseGround, joints: Joints, chain: tuple[str, ...]) -> Overlays:

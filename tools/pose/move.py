@@ -8,19 +8,24 @@ import numpy as np
 
 from core.document import METRES_PER_UNIT
 from core.field import field
-from core.overlay import Circle, Label, Overlays, Polyline
+from core.overlay import Circle, Label, Overlay, Overlays, Polyline, Tone
 from core.pose.pose import SAME, Pose, Vector
 from core.transform import Array
 from tools.pose.craft import PoseGround, Posing
 from tools.pose.posing import (
     AXES,
+    BEHIND,
     HANDLE,
+    NAMES,
+    THICK,
+    THIN,
     Joints,
     ManipulatorParams,
     PosingStroke,
-    dots,
     frame_of,
+    joint_under,
     joints_of,
+    meant,
     metres_per_pixel,
     pick,
     selected,
@@ -29,6 +34,7 @@ from tools.pose.posing import (
 from tools.tool import Pointer, Stroke, Tool, Turn
 
 FREE = 3  # the handle in the middle: across the line of sight
+HEAD = 16.0  # pixels of the head of an arrow
 LEAST = 0.05  # of an arrow that is seen end on: how long it must look to be dragged along
 
 
@@ -64,10 +70,11 @@ class Move(Tool[MoveParams]):
         return pick(ground, joints, self.params, pointer)
 
     def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
-        """Joints and bones, and the arrows of the active joint."""
+        """The arrows of the active joint, that under the pointer brighter, else the joint that a click would pick."""
         joints, selection = joints_of(ground, ground.pose), selected(ground)
         under = arrow_under(ground, joints, selection, self.params, pointer)
-        return dots(ground, joints, selection) + arrows(ground, joints, selection, self.params, under)
+        picked = joint_under(ground, joints, pointer) if under is None else None
+        return arrows(ground, joints, selection, self.params, under) + meant(ground, joints, picked)
 
 
 class MoveStroke(PosingStroke):
@@ -121,12 +128,23 @@ class MoveStroke(PosingStroke):
         return moved
 
     def overlays(self) -> Overlays:
-        """How far, in words, and the arrows where the joint is now."""
-        now = self.joints._replace(pixels=self.ground.view.pixels(self.joints.world[:, :3, 3] + self.moved)[0])
-        x, y = map(float, now.pixels[self.active])
+        """The line along the axis, the way from where the joint was to where it is, and how far in words."""
+        reach = 1e3 * metres_per_pixel(self.ground, self.centre)
+        axis = np.zeros(3) if self.axis is None else self.axis
+        places = self.centre + np.array([-reach * axis, reach * axis, np.zeros(3), self.moved])
+        pixels, w = self.ground.view.pixels(places)
         unit = self.ground.unit
-        words = f"{float(np.linalg.norm(self.moved)) / METRES_PER_UNIT[unit]:.4g} {unit}"
-        return (Label(x + self.params.size, y - self.params.size, words),)
+        far = float(np.linalg.norm(self.moved) if self.axis is None else self.moved @ self.axis)
+        free = self.axis is None
+        words = "" if free else f"{NAMES[self.arrow]} "
+        words += f"{far / METRES_PER_UNIT[unit]:{'' if free else '+'}.3f} {unit}"
+        line: list[Overlay] = []
+        if not free and (w > 0.0).all():
+            line = [Polyline(pixels[:2], AXES[self.arrow], BEHIND)]
+        x, y = map(float, pixels[3])
+        return (
+            *line, Circle(float(pixels[2, 0]), float(pixels[2, 1]), 4.0, "plain"),
+            Polyline(pixels[2:], "selected", THICK), Label(x + 16.0, y - 12.0, words, "selected", True))
 
 
 def arrow_ends(ground: PoseGround, joints: Joints, joint: int, params: ManipulatorParams) -> Array:
@@ -167,13 +185,22 @@ def arrows(
     if not joints.seen[joint]:
         return ()
     middle = joints.pixels[joint]
-    drawn: list[Polyline | Circle] = []
+    drawn: list[Overlay] = []
     for k, end in enumerate(arrow_ends(ground, joints, joint, params)):
         along = end - middle
-        side = np.array([-along[1], along[0]])
-        head = np.array([middle, end, end - 0.18 * along + 0.08 * side, end - 0.18 * along - 0.08 * side, end])
-        drawn.append(Polyline(head, "selected" if k == under else AXES[k], 3.0 if k == under else 1.5))
+        length = float(np.linalg.norm(along))
+        tone: Tone = "selected" if k == under else AXES[k]
+        if length > 1e-6:
+            ahead = along / length
+            side, tip = np.array([-ahead[1], ahead[0]]), min(HEAD, 0.5 * length)
+            foot = end - tip * ahead
+            width = THICK if k == under else THIN
+            head = np.array([end, foot + 0.4 * tip * side, foot - 0.4 * tip * side])
+            drawn += [Polyline(np.array([middle, foot]), tone, width), Polyline(head, tone, width, closed=True),
+                      Polyline(np.array([foot, end]), tone, 0.5 * tip)]
+        x, y = map(float, end + 12.0 * along / max(length, 12.0))
+        drawn.append(Label(x - 4.0, y + 4.0, NAMES[k], tone))
     free = under == FREE
     drawn.append(Circle(
-        float(middle[0]), float(middle[1]), HANDLE, "selected" if free else "plain", 3.0 if free else 1.0))
+        float(middle[0]), float(middle[1]), HANDLE, "selected" if free else "plain", THICK if free else THIN))
     return tuple(drawn)

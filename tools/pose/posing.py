@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.field import field
-from core.overlay import Circle, Overlays, Polyline, Tone
+from core.overlay import Circle, Label, Overlays, Tone
 from core.pose.constraints import constrained
 from core.pose.mirror_pose import mirror_of_rig, with_other_side
 from core.pose.pose import Pose, local_of_pose
@@ -22,7 +22,9 @@ from tools.tool import Hit, Pointer
 
 JOINT = 14.0  # pixels within which a pointer means a joint
 HANDLE = 9.0  # the same of a ring or an arrow
-AXES: tuple[Tone, ...] = ("trouble", "good", "accent")  # red, green, blue by the theme
+AXES: tuple[Tone, ...] = ("x", "y", "z")
+NAMES = "XYZ"
+THICK, THIN, BEHIND = 4.0, 2.5, 1.0  # lines of a handle that is meant, of the others, of their far side; pixels
 
 
 class ManipulatorParams(Record):
@@ -33,7 +35,7 @@ class ManipulatorParams(Record):
         choices=("local", "world"))] = "local"
     size: Annotated[float, field(
         "Handle size", "How far the handles reach from the joint, in pixels of the view.", "px", (40, 200),
-        (20, 1000))] = 80.0
+        (20, 1000))] = 100.0
     add: Annotated[bool, field(
         "Add to selection", "A click adds the joint to those that are selected, or takes it out again.")] = False
 
@@ -154,15 +156,12 @@ def pick(ground: PoseGround, joints: Joints, params: ManipulatorParams, pointer:
     return PosingStroke(ground, selected_with(selection, joint, params.add))
 
 
-def dots(ground: PoseGround, joints: Joints, selection: tuple[str, ...]) -> Overlays:
-    """Bones as faint lines and joints as dots, the selected ones filled by their tone."""
-    skeleton = ground.rig.skeleton
-    marks: list[Circle | Polyline] = []
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0 and joints.seen[joint] and joints.seen[parent]:
-            marks.append(Polyline(joints.pixels[[parent, joint]], "faint", 1.0))
-    for joint, name in enumerate(skeleton.names):
-        if joints.seen[joint]:
-            x, y = map(float, joints.pixels[joint])
-            marks.append(Circle(x, y, 4.0, "selected" if name in selection else "plain"))
-    return tuple(marks)
+def meant(ground: PoseGround, joints: Joints, joint: str | None) -> Overlays:
+    """A ring about the joint that a click would pick, and its name; nothing where that is none."""
+    if joint is None:
+        return ()
+    row = ground.rig.skeleton.names.index(joint)
+    if not joints.seen[row]:
+        return ()
+    x, y = map(float, joints.pixels[row])
+    return Circle(x, y, 8.0, "accent", 2.0), Label(x + 14.0, y - 10.0, joint, plate=True)

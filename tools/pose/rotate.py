@@ -8,20 +8,25 @@ from typing import Annotated
 import numpy as np
 
 from core.field import field
-from core.overlay import Circle, Label, Overlays, Polyline
+from core.overlay import Circle, Label, Overlay, Overlays, Polyline, Tone
 from core.pose.ik import turned_joint
 from core.pose.pose import Pose, local_of_pose, pose_of_local
 from core.transform import Array, matrix_from_quaternion, normalized, quaternion_about
 from tools.pose.craft import PoseGround, Posing
 from tools.pose.posing import (
     AXES,
+    BEHIND,
     HANDLE,
+    NAMES,
+    THICK,
+    THIN,
     Joints,
     ManipulatorParams,
     PosingStroke,
-    dots,
     frame_of,
+    joint_under,
     joints_of,
+    meant,
     metres_per_pixel,
     pick,
     selected,
@@ -68,10 +73,11 @@ class Rotate(Tool[RotateParams]):
         return pick(ground, joints, self.params, pointer)
 
     def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
-        """Joints and bones, and the rings of the active joint, the one under the pointer brighter."""
+        """The rings of the active joint, the one under the pointer brighter, else the joint that a click would pick."""
         joints, selection = joints_of(ground, ground.pose), selected(ground)
         under = ring_under(ground, joints, selection, self.params, pointer)
-        return dots(ground, joints, selection) + rings(ground, joints, selection, self.params, under)
+        picked = joint_under(ground, joints, pointer) if under is None else None
+        return rings(ground, joints, selection, self.params, under) + meant(ground, joints, picked)
 
 
 class RotateStroke(PosingStroke):
@@ -89,8 +95,10 @@ class RotateStroke(PosingStroke):
         self.axis = self.eye if ring == VIEW else frame_of(joints, self.active, params.axes)[:, ring]
         self.edge_on = abs(float(self.axis @ self.eye)) < EDGE_ON
         self.start, self.angle = pointer, 0.0
-        self.last = 0.0 if self.edge_on else self._around(pointer)
-        self.whole = 0.0
+        self.across = normalized(np.cross(self.axis, np.eye(3)[int(np.argmin(np.abs(self.axis)))]))
+        self.last = 0.0
+        self.first = self._angle_of(self.eye) if self.edge_on else self._around(pointer)
+        self.last, self.whole = self.first, 0.0
 
     def _around(self, pointer: Pointer) -> float:
         """The angle, radians, of the pointer on the plane of the ring, about its axis."""
@@ -98,9 +106,11 @@ class RotateStroke(PosingStroke):
         slope = float(direction @ self.axis)
         if abs(slope) < 1e-9:
             return self.last
-        place = origin + direction * (float((self.centre - origin) @ self.axis) / slope) - self.centre
-        across = normalized(np.cross(self.axis, np.eye(3)[int(np.argmin(np.abs(self.axis)))]))
-        return math.atan2(float(place @ np.cross(self.axis, across)), float(place @ across))
+        return self._angle_of(origin + direction * (float((self.centre - origin) @ self.axis) / slope) - self.centre)
+
+    def _angle_of(self, place: Array) -> float:
+        """The angle, radians, of a place (3,) from the joint, about the axis."""
+        return math.atan2(float(place @ np.cross(self.axis, self.across)), float(place @ self.across))
 
     def _along(self, pointer: Pointer) -> float:
         """The same of a ring seen from its edge: how far the pointer pulled along it, over its radius."""
@@ -133,11 +143,25 @@ class RotateStroke(PosingStroke):
         return pose_of_local(skeleton, local, before.name, dict(before.numbers))
 
     def overlays(self) -> Overlays:
-        """The angle in words, beside the joint, and the ring that is held."""
-        x, y = map(float, self.joints.pixels[self.active])
-        reach = self.params.size * (VIEW_SIZE if self.ring == VIEW else 1.0)
-        return (*rings(self.ground, self.joints, self.selection, self.params, self.ring),
-                Label(x + reach, y - reach, f"{math.degrees(self.angle):.1f}\N{DEGREE SIGN}"))
+        """The ring that is held, the sector it was turned by, and the angle in words."""
+        size = self.params.size * (VIEW_SIZE if self.ring == VIEW else 1.0)
+        radius = size * metres_per_pixel(self.ground, self.centre)
+        low, high = sorted((self.angle, 0.0))
+        # more than a whole turn is drawn as one
+        turn = np.append(np.linspace(0.0, 2.0 * np.pi, STEPS), self.first + np.linspace(
+            max(low, high - 2.0 * np.pi), high, STEPS))[:, None]
+        places = self.centre + radius * (np.cos(turn) * self.across + np.sin(turn) * np.cross(self.axis, self.across))
+        pixels = self.ground.view.pixels(places)[0]
+        middle = self.joints.pixels[self.active]
+        began, now = (pixels[STEPS], pixels[-1]) if self.angle >= 0.0 else (pixels[-1], pixels[STEPS])
+        tone: Tone = "plain" if self.ring == VIEW else AXES[self.ring]
+        out = (now - middle) / max(float(np.linalg.norm(now - middle)), 1e-9)
+        x, y = map(float, now + 16.0 * out + [8.0, 4.0])
+        name = "" if self.ring == VIEW else f"{NAMES[self.ring]} "
+        return (
+            Polyline(pixels[:STEPS], tone, BEHIND), Polyline(np.array([middle, began]), "plain", BEHIND, dashed=True),
+            Polyline(np.vstack([middle, now]), "selected", THIN), Polyline(pixels[STEPS:], "selected", THICK),
+            Label(x, y, f"{name}{math.degrees(self.angle):+.1f}\N{DEGREE SIGN}", "selected", True))
 
 
 def ring_points(ground: PoseGround, joints: Joints, joint: int, params: ManipulatorParams) -> list[Array]:
@@ -180,16 +204,28 @@ def _distance(place: Array, points: Array) -> float:
 def rings(
     ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, under: int | None
 ) -> Overlays:
-    """The rings of the active joint, the one that is meant thicker."""
+    """The rings of the active joint, thin on their far side, the one that is meant thick; their names beside them."""
     if not selection:
         return ()
     joint = ground.rig.skeleton.names.index(selection[-1])
     if not joints.seen[joint]:
         return ()
     x, y = map(float, joints.pixels[joint])
-    drawn = [
-        Polyline(points, "selected" if k == under else AXES[k], 3.0 if k == under else 1.5, closed=True)
-        for k, points in enumerate(ring_points(ground, joints, joint, params))
-    ]
-    chosen = under == VIEW
-    return (*drawn, Circle(x, y, VIEW_SIZE * params.size, "selected" if chosen else "plain", 3.0 if chosen else 1.0))
+    frame, eye = frame_of(joints, joint, params.axes), towards_eye(ground, joints.world[joint, :3, 3])
+    turn = np.linspace(0.0, 2.0 * np.pi, STEPS, endpoint=False)
+    far: list[Overlay] = []
+    near: list[Overlay] = []
+    for k, points in enumerate(ring_points(ground, joints, joint, params)):
+        tone: Tone = "selected" if k == under else AXES[k]
+        side = np.cos(turn) * (frame[:, (k + 1) % 3] @ eye) + np.sin(turn) * (frame[:, (k + 2) % 3] @ eye)
+        first = (int(np.argmax(side)) + STEPS // 2) % STEPS  # in the middle of the far half
+        half, open_end = STEPS // 4, np.roll(np.arange(STEPS), -first)
+        far.append(Polyline(points[np.append(open_end[-half:], open_end[: half + 1])], tone, BEHIND))
+        near.append(Polyline(points[open_end[half:-half + 1]], tone, THICK if k == under else THIN))
+        tips = points[open_end[half:-half]] - [x, y]
+        tip = tips[int(np.argmax(np.linalg.norm(tips, axis=1)))]
+        at = [x, y] + tip + 12.0 * tip / max(float(np.linalg.norm(tip)), 1.0)
+        near.append(Label(float(at[0]) - 4.0, float(at[1]) + 4.0, NAMES[k], tone))
+    whole = Circle(x, y, VIEW_SIZE * params.size, "selected" if under == VIEW else "plain",
+                   THICK if under == VIEW else BEHIND)
+    return (whole, *far, *near)
