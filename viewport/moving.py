@@ -32,6 +32,7 @@ from viewport.scene import Coat, GuideLines, Scene, mean_width
 from viewport.touched import Touched
 
 MOST_ACROSS = 6.0  # strands of a wide ribbon
+OPENED_AT_ONCE = 1500  # hairs around moved ones that are taken out of the finished picture in one moving picture
 MAP_SIDE = 256  # of the light's maps that are drawn anew whenever the light turns
 
 
@@ -61,6 +62,8 @@ class Moving:
         self.touched: list[tuple[np.ndarray, np.ndarray]] = []  # arrays and their rows changed since the last picture
         self._moved: list[NDArray[np.bool_]] = []  # since the finished picture, of every coat
         self._opened: list[NDArray[np.bool_]] = []  # where they were is a hole
+        self._owed: list[NDArray[np.bool_]] = []  # where they are shall be one
+        self.opening = False  # more of what is owed is to be done by another picture, changed or not
         self._neighbours: list[Neighbours] = []
         self._still: list[Coat] = []  # what is drawn of every coat, as it was in the finished picture
         self._guides_moved: list[NDArray[np.bool_]] = []
@@ -103,6 +106,7 @@ class Moving:
         for drawable in drawables:
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0}))
+        self.opening = False
         behind = self.base if picture is None else self._patched(scene, camera, picture, uniforms["clip_from_world"])
         self.touched = []
         self.ctx.copy_framebuffer(target, behind.framebuffer)
@@ -126,6 +130,8 @@ class Moving:
         self.patch.start(*picture)
         self._moved = [np.zeros(len(coat.points), bool) for coat in scene.coats]
         self._opened = [moved.copy() for moved in self._moved]
+        self._owed = [moved.copy() for moved in self._moved]
+        self.opening = False
         self._neighbours = [Neighbours(coat, drawn, camera) for coat, drawn in self._sparse]
         self._still = [drawn for _, drawn in self._sparse]
         self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
@@ -142,17 +148,19 @@ class Moving:
         assert self.base is not None
         assert patch.target is not None
         for i, (coat, drawn) in enumerate(self._sparse):
-            rows = [rows for points, rows in self.touched if points is coat.points]
-            if rows:
-                new = np.unique(np.concatenate(rows))
-                new = new[~self._moved[i][new]]
-                self._moved[i][new] = True
-                around = self._neighbours[i].around(new)
-                new = np.union1d(new, around[~self._opened[i][around]])
-                self._opened[i][new] = True
-                new = new[turned_to(camera, roots_of(coat.points)[new], coat.normals[new])]
-                patch.open(renderer.coats[i].textures, new, self.base, matrix)
-                self._touched.add(coat.points, new, camera)
+            for points, rows in self.touched:
+                if points is coat.points:
+                    new = rows[~self._moved[i][rows]]
+                    self._moved[i][new] = True
+                    self._owed[i][self._neighbours[i].around(new)] = True
+            new = np.flatnonzero(self._moved[i] & ~self._opened[i])
+            around = np.flatnonzero(self._owed[i] & ~self._opened[i] & ~self._moved[i])
+            self.opening |= len(around) > OPENED_AT_ONCE
+            new = np.concatenate([new, around[:OPENED_AT_ONCE]])
+            self._opened[i][new] = True
+            new = new[turned_to(camera, roots_of(coat.points)[new], coat.normals[new])]
+            patch.open(renderer.coats[i].textures, new, self.base, matrix)
+            self._touched.add(coat.points, new, camera)
             assert drawn.order is not None
             moved = np.flatnonzero(self._moved[i][drawn.order])
             patch.open(self.coats[i].textures, moved, self.base, matrix)

@@ -23,6 +23,7 @@ from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids
 
 LARGEST_TILE = 4096  # samples on a side
+TILES_KEPT = 2  # a window paints with one sample and with four in turns, and fresh memory of that size takes 50 ms
 SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps
 
 Progress = Callable[[float], object]
@@ -36,6 +37,19 @@ class Prepared(NamedTuple):
     size: tuple[int, int]
     uniforms: dict[str, Any]
     options: ViewOptions
+
+
+class _Tile(NamedTuple):
+    """What samples of a tile are painted into."""
+
+    light: moderngl.Texture
+    depth: moderngl.Renderbuffer
+    target: moderngl.Framebuffer
+
+    def release(self) -> None:
+        """Give back the memory; the context must be current."""
+        for thing in (self.target, self.depth, self.light):
+            thing.release()
 
 
 class Renderer:
@@ -59,7 +73,7 @@ class Renderer:
         self.outline = Outline()
         self.coats: list[CoatDrawable] = []
         self.guides: list[GuideDrawable] = []
-        self.tile: tuple[moderngl.Texture, moderngl.Renderbuffer, moderngl.Framebuffer] | None = None
+        self.tiles: list[_Tile] = []  # the last used first
 
     def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
         """Upload again, before the next picture, these rows of an array of hairs or guides written to in place."""
@@ -138,11 +152,11 @@ class Renderer:
         for number, tile in enumerate(tiles):
             painted = self._paint_tile(prepared, samples, tile, orders, pieces)
             yield from _scaled(painted, 0.1 + 0.9 * number / len(tiles), 0.1 + 0.9 * (number + 1) / len(tiles))
-            assert self.tile is not None
+            light = self.tiles[0].light
             band = max(1, 2 * SAMPLES_AT_ONCE // (tile[2] * samples**2))
             for bottom in range(0, tile[3], band):
                 framebuffer.scissor = (tile[0], tile[1] + bottom, tile[2], min(band, tile[3] - bottom))
-                self.backdrop.resolved(self.tile[0], scene, size, samples, tile, framebuffer)
+                self.backdrop.resolved(light, scene, size, samples, tile, framebuffer)
                 framebuffer.scissor = None  # type: ignore[assignment]
                 yield 0.1 + 0.9 * (number + 1) / len(tiles)
         yield 1.0
@@ -184,28 +198,24 @@ class Renderer:
             before += share
 
     def _tile_target(self, width: int, height: int) -> moderngl.Framebuffer:
-        if self.tile is None or self.tile[0].size != (width, height):
-            self._release_tile()
-            color = self.ctx.texture((width, height), 4, dtype="f2")
-            color.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        found = next((tile for tile in self.tiles if tile.light.size == (width, height)), None)
+        if found is None:
+            for old in self.tiles[TILES_KEPT - 1 :]:
+                old.release()
+            light = self.ctx.texture((width, height), 4, dtype="f2")
+            light.filter = (moderngl.NEAREST, moderngl.NEAREST)
             depth = self.ctx.depth_renderbuffer((width, height))
-            self.tile = (color, depth, self.ctx.framebuffer([color], depth))
-        return self.tile[2]
-
-    def _release_tile(self) -> None:
-        if self.tile is not None:
-            for thing in reversed(self.tile):
-                thing.release()
-            self.tile = None
+            found = _Tile(light, depth, self.ctx.framebuffer([light], depth))
+        self.tiles = [found, *(tile for tile in self.tiles if tile is not found)][:TILES_KEPT]
+        return found.target
 
     def release(self) -> None:
         """Give back everything; the context must be current."""
-        self._release_tile()
-        things: list[Any] = [*self.coats, *self.guides, self.backdrop, self.solids]
+        things: list[Any] = [*self.tiles, *self.coats, *self.guides, self.backdrop, self.solids]
         things += [self.light_maps, self.ribbons, self.strand_programs, self.guide_programs]
         for thing in things:
             thing.release()
-        self.coats, self.guides = [], []
+        self.coats, self.guides, self.tiles = [], [], []
 
 
 def _scaled(steps: Any, low: float, high: float) -> Generator[float, None, Any]:

@@ -159,6 +159,11 @@ class View3D:
         self.picture_changed = True
         return shown
 
+    @property
+    def opening(self) -> bool:
+        """True when one more moving picture shows more of what has changed, though nothing changes any more."""
+        return self.moving.opening
+
     def refine(self) -> Iterator[float]:
         """Make the picture finer, a slice of about 25 ms at every ``next``; the done part 0 .. 1.
 

@@ -80,7 +80,7 @@ class LivePicture:
         changed = self._take(change, camera)
         if not moving:
             self._ask()
-        return changed
+        return changed or self.view.opening
 
     def draw(self) -> None:
         """Draw the moving picture."""

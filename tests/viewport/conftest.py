@@ -36,8 +36,7 @@ def draw(ctx: moderngl.Context) -> Iterator[Callable[..., np.ndarray]]:
         renderer.draw(scene, camera, target, (width, height))
         target.release()
         color.release()
-        assert renderer.tile is not None
-        raw = np.frombuffer(renderer.tile[0].read(), np.float16).astype(np.float64)
+        raw = np.frombuffer(renderer.tiles[0].light.read(), np.float16).astype(np.float64)
         return raw.reshape(height, width, 4)[::-1]
 
     yield call

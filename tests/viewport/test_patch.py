@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import viewport.moving
 from core.camera import project
 from core.workspace import ViewOptions
 from tests.viewport.scenes import FLAT, camera, hairs, quad
@@ -42,7 +43,7 @@ def stroke(ctx):
             view.draw_interactive(count)
         return before, shown()
 
-    call.view = view
+    call.view, call.shown = view, shown
     yield call
     view.release()
     target.release()
@@ -177,6 +178,29 @@ def test_hairs_that_are_not_yet_evaluated_leave_with_those_that_are(stroke):
     same_as_before = np.abs(after - before).max(axis=2) <= 1
     assert same_as_before[away < at[1, 0] - at[0, 0]].mean() < 0.12
     assert same_as_before[away > at[2, 0] - at[0, 0]].all()
+
+
+def test_many_hairs_leave_in_several_pictures_that_come_by_themselves(stroke, monkeypatch):
+    """The first touch of a stroke takes thousands of hairs out of the finished picture: not all in one frame."""
+    pictures = []
+    for at_once in (100_000, 60):
+        monkeypatch.setattr(viewport.moving, "OPENED_AT_ONCE", at_once)
+        coat = field(6000)
+        rows, push = brushed(coat, radius=0.3, push=0.06)
+        evaluated = np.intersect1d(rows, coat.order[:400])
+
+        def comb(scene, coat=coat, evaluated=evaluated, push=push):
+            coat.points[evaluated, 0] += push * np.linspace(0.0, 1.0, 8, dtype=np.float32)
+            return scene, coat.points, evaluated
+
+        _, after = stroke(Scene((quad(),), (coat,)), comb, count=400)
+        more = 0
+        while stroke.view.opening:
+            stroke.view.draw_interactive(400)
+            after, more = stroke.shown(), more + 1
+        pictures.append(after)
+        assert (more > 3) == (at_once == 60)
+    assert np.abs(pictures[0] - pictures[1]).max() <= 1
 
 
 def test_neighbours_are_those_a_sparse_hair_stands_for():
