@@ -16,6 +16,7 @@ from core.formats.frame_decoder import FrameDecoder
 from core.image.mix import mixed
 from core.image.plate import ChannelMix
 from core.match.flow import LEAST_SIDE, flow_between
+from core.workers import Workers
 
 
 def command(
@@ -32,7 +33,7 @@ def command(
     if not output.resolve().parent.is_dir():
         raise UserError(f"the folder {output.resolve().parent} does not exist; make it first")
     report = Report(as_json)
-    decoder = FrameDecoder()
+    workers, decoder = Workers(), FrameDecoder()
     try:
         with report.working(total=3):
             with report.stage("read", "reading"):
@@ -44,11 +45,12 @@ def command(
             if min(a.shape[:2]) < LEAST_SIDE:
                 raise UserError(f"the frames are smaller than {LEAST_SIDE} pixels; there is no flow to measure")
             with report.stage("flow", "measuring"):
-                flow = flow_between(a, b, spacing=spacing)
+                flow = flow_between(a, b, spacing=spacing, ranges=workers.ranges)
             with report.stage("write", "writing"), atomic_write(output) as beside:
                 write_flow(beside, flow, output.suffix)
     finally:
         decoder.close()
+        workers.close()
     length = np.linalg.norm(flow.vectors, axis=2)
     sigma = np.sqrt(np.maximum(flow.covariance[:, :, 0] + flow.covariance[:, :, 2], 0.0) / 2.0)
     result = {

@@ -41,8 +41,22 @@ def mixed(pixels: NDArray[Any], mix: ChannelMix) -> NDArray[np.float32]:
     return np.ascontiguousarray(image.reshape(*pixels.shape[:2], -1), np.float32)
 
 
+def even_grey(first: NDArray[np.float32], second: NDArray[np.float32]) -> tuple[NDArray[np.float32], ...]:
+    """Two images (H, W, C) as greys (H, W) on one scale, from 0 at the darkest to 1 at the lightest hundredth."""
+    greys = [mean_grey(image) for image in (first, second)]
+    low, high = np.percentile(np.stack([grey[::4, ::4] for grey in greys]), (0.5, 99.5))
+    scale = np.float32(1.0 / max(float(high - low), 1e-6))
+    return tuple((grey - np.float32(low)) * scale for grey in greys)
+
+
 def grey_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
     """An image (H, W, C) as 8-bit grey from its darkest to its lightest hundredth, for methods that want no more."""
-    grey = image.mean(axis=2)
+    grey = mean_grey(image)
     low, high = np.percentile(grey[::4, ::4], (0.5, 99.5))
     return np.clip((grey - low) * (255.0 / max(float(high - low), 1e-6)), 0.0, 255.0).astype(np.uint8)
+
+
+def mean_grey(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The mean of the channels (H, W)."""
+    channels = image.shape[2]
+    return np.asarray(image @ np.full(channels, 1.0 / channels, np.float32))

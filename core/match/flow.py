@@ -1,10 +1,14 @@
 """Optical flow between two frames as a spline (Szeliski & Coughlan, "Spline-based image registration", IJCV 22, 1997).
 
 The displacement is a cubic B-spline over a control grid, so it is smooth where the motion is and there are no windows
-that overlap. It is found coarse to fine with Gauss-Newton (conjugate gradients on the grid, matrix-free). Dense
-inverse search (Kroeger et al. 2016, by OpenCV) gives the start; where it breaks at an edge by more than the spline can
-follow, its break is kept beside the spline, and the grid is made finer. Every vertex has a covariance from its part of
-the normal equations and from how well the frames agree around it.
+that overlap. It is found coarse to fine with Gauss-Newton (conjugate gradients on the grid, matrix-free), begun by
+dense inverse search (Kroeger et al., "Fast optical flow using dense inverse search", ECCV 2016, by OpenCV). The grid is
+subdivided only where it earns it: where the coarse spline explains the frames worse than the search did, or leaves the
+search far without explaining them better. What not even the finest grid can follow, an edge of the motion, stays as
+the search found it.
+
+Every pixel has a covariance: from the normal equations around its vertex and how well the frames agree there, and
+from how far the search back from the second frame misses it.
 """
 
 from __future__ import annotations
@@ -16,15 +20,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.image.mix import grey_bytes
+from core.image.mix import even_grey
 from core.match.flow_kernels import data_term, gather, normal_product, spread
+from core.workers import serial_ranges
 
 Field = NDArray[np.float32]
-BREAK = 0.25  # pixels: what differs more from the spline is an edge of the motion
+Ranges = Callable[[int, Callable[[int, int], object], int], None]
+LEVELS = ((4, 1.2), (2, 1.0), (1, 0.5))  # spacing over the finest; pixels of the Gauss before the frames are compared
+BIAS = 15  # pixels: side of the window whose mean difference is light, not motion
 STIFFNESS = 0.02  # of the strength of the data: keeps the grid still where there is nothing to see
 SWEEPS = 6  # of conjugate gradients in a step of Gauss-Newton
 LEAST_SIDE = 32
-WORSE, LEAST_GREY = 1.0, 0.001  # than where the search left it, of the range of grey: the spline is not believed
+MOST = np.float32(4.0)  # pixels in one step
+LEAST_GREY = 0.001  # of the range of grey: by so much the spline may explain worse than the search
+FAR, BETTER = 0.5, 0.9  # pixels off the search, and how little of its disagreement must then be left
+WINDOW = 7  # pixels: side of the neighbourhood two flows are compared over
+NOTHING = np.float32(0.003)  # of the covariance of a vertex alone: it tells where there is nothing to see
+LEAST_SHARE = 0.1  # of a cell that is subdivided
+NEAR, WIDE = 5, 31  # pixels: sides of the windows over which the searches are compared with the flow
 
 
 class Flow(NamedTuple):
@@ -38,137 +51,217 @@ class Flow(NamedTuple):
 
 
 def flow_between(
-    first: Field, second: Field, *, spacing: int = 8, rounds: int = 2, cancel: Callable[[], bool] | None = None
+    first: Field,
+    second: Field,
+    *,
+    spacing: int = 8,
+    rounds: int = 2,
+    cancel: Callable[[], bool] | None = None,
+    ranges: Ranges = serial_ranges,
 ) -> Flow:
     """Flow from `first` to `second`, both (H, W, C) float32 of one size.
 
-    spacing : pixels between vertices of the finest grid. rounds : steps of Gauss-Newton on the finest level.
+    spacing : pixels between vertices of the finest grid. rounds : steps of Gauss-Newton on every level.
     """
     if first.shape != second.shape:
         raise ValueError("flow needs two frames of one size")
-    start = start_flow(first, second)
-    a, b = _even(first, second)
-    base = start
-    for level, step in ((1, 2 * spacing), (0, spacing)):
-        smooth = fitted(base, step)
-        # where the spline cannot follow an edge of the motion, the break stays beside it
-        torn = np.linalg.norm(base - smooth, axis=2) > BREAK
-        keep = cv2.blur(cv2.dilate(torn.astype(np.float32), np.ones((5, 5), np.uint8)), (5, 5))[:, :, None]
-        base = smooth + keep * (base - smooth)
-        ga, gb = (np.asarray(cv2.GaussianBlur(image, (0, 0), 0.8 + level), np.float32) for image in (a, b))
+    start, back = search_flow(first, second, ranges)
+    a, b = even_grey(first, second)
+    y, x = np.mgrid[0 : a.shape[0], 0 : a.shape[1]]
+    places = np.stack((x, y), axis=2).astype(np.float32)
+    left = _disagreement(a, b, start, places)
+    flow = fitted(start, LEVELS[0][0] * spacing)
+    covariance = np.zeros((*a.shape, 3), np.float32)
+    torn = np.ones(a.shape, np.float32)  # where the grid of the level is needed
+    for level, (times, sigma) in enumerate(LEVELS):
+        step = times * spacing
+        if level:
+            torn = _torn(a, b, flow, start, left, places)
+            flow = flow + fitted(_soft(torn, 5) * (start - flow), step)
+        active = (_onto(torn, step) > LEAST_SHARE * step * step).astype(np.float32)
+        if not active.any() or (cancel is not None and cancel()):
+            break
+        ga, gb = (np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.float32) for image in (a, b))
         for _ in range(rounds):
-            if cancel is not None and cancel():
-                break
-            base, covariance = _improved(ga, gb, base, step)
-    worse = _disagreement(a, b, base) > WORSE * _disagreement(a, b, start) + LEAST_GREY
-    taken = cv2.blur(worse.astype(np.float32), (3, 3))[:, :, None]
-    return Flow(base + taken * (start - base), covariance)
+            seen = _compared(ga, gb, flow, places)
+            flow = flow + _step(seen, step, active)
+        part = _soft(torn, 5) if level else np.ones((1, 1, 1), np.float32)
+        covariance = covariance + part * (_covariance(seen, step) - covariance)
+    flow = flow + _soft(_torn(a, b, flow, start, left, places), 3) * (start - flow)
+    return Flow(flow, NOTHING * covariance + _missed(flow, start, back, places))
 
 
-def _disagreement(first: Field, second: Field, flow: Field) -> Field:
+def search_flow(first: Field, second: Field, ranges: Ranges = serial_ranges) -> tuple[Field, Field]:
+    """Dense inverse search between two frames (H, W, C), there and, with less care, back: (H, W, 2) pixels each."""
+    grey = [(255.0 * np.clip(image, 0.0, 1.0)).astype(np.uint8) for image in even_grey(first, second)]
+    found: list[Field] = [np.zeros((*image.shape, 2), np.float32) for image in grey]
+    if min(grey[0].shape) < LEAST_SIDE:
+        return found[0], found[1]
+
+    def call(begin: int, end: int) -> None:
+        for n in range(begin, end):
+            search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+            search.setFinestScale(0)
+            search.setPatchStride((4, 5)[n])
+            search.setGradientDescentIterations((30, 12)[n])
+            search.setVariationalRefinementIterations((5, 2)[n])
+            found[n] = np.asarray(search.calc(grey[n], grey[1 - n], found[n]), np.float32)
+
+    ranges(2, call, 1)
+    return found[0], found[1]
+
+
+def _warped(image: Field, flow: Field, places: Field, how: int) -> Field:
+    """The second frame brought back by a flow; `places` (H, W, 2) are those of the pixels."""
+    x, y = cv2.split(flow + places)
+    return np.asarray(cv2.remap(image, x, y, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
+
+
+def _unlit(difference: Field) -> Field:
+    """A difference, or a gradient, without what is constant around a pixel: another exposure, a shadow."""
+    return difference - np.asarray(cv2.blur(difference, (BIAS, BIAS)), np.float32)
+
+
+def _disagreement(first: Field, second: Field, flow: Field, places: Field) -> Field:
     """How much the frames differ around every pixel when the second is brought back by the flow."""
-    height, width = first.shape
-    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-    warped = cv2.remap(second, x + flow[:, :, 0], y + flow[:, :, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.blur(np.abs(warped - first), (7, 7)))
+    difference = _warped(second, flow, places, cv2.INTER_LINEAR) - first
+    return np.asarray(cv2.blur(np.abs(_unlit(difference)), (WINDOW, WINDOW)))
 
 
-def start_flow(first: Field, second: Field) -> Field:
-    """Dense inverse search between two frames (H, W, C): (H, W, 2) pixels."""
-    search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    a, b = grey_bytes(np.concatenate((first, second))).reshape(2, *first.shape[:2])
-    if min(a.shape) < LEAST_SIDE:
-        return np.zeros((*a.shape, 2), np.float32)
-    return np.asarray(
-        search.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), np.zeros((*a.shape, 2), np.float32))
-    )
+def _torn(first: Field, second: Field, flow: Field, start: Field, left: Field, places: Field) -> Field:
+    """1 where a flow is not believed against the search, which left the disagreement `left`, else 0."""
+    here = _disagreement(first, second, flow, places)
+    away = cv2.magnitude(*cv2.split(flow - start))
+    torn = (here > left + LEAST_GREY) | ((away > FAR) & (here > BETTER * left))
+    return np.asarray(cv2.dilate(torn.astype(np.float32), np.ones((3, 3), np.uint8)))
+
+
+def _soft(area: Field, side: int) -> Field:
+    return np.asarray(cv2.blur(area, (side, side)), np.float32)[:, :, None]
+
+
+def _missed(flow: Field, start: Field, back: Field, places: Field) -> Field:
+    """Covariance (H, W, 3) of what the searches there and back say against the flow.
+
+    Close by every gap counts, its noise too; over a wide window noise is gone and a common lean is left.
+    """
+    gap = flow + _warped(back, flow, places, cv2.INTER_LINEAR)
+    lean, off = (np.asarray(cv2.blur(field, (WIDE, WIDE)), np.float32) for field in (gap, flow - start))
+    return np.asarray(cv2.blur(_outer(gap), (NEAR, NEAR)) + _outer(lean) + _outer(off), np.float32)
+
+
+def _outer(field: Field) -> Field:
+    u, v = field[:, :, 0], field[:, :, 1]
+    return np.stack((u * u, u * v, v * v), axis=2)
 
 
 def fitted(field: Field, step: int) -> Field:
-    """The smooth spline near a field (H, W, 2): averaged onto the grid with its own weights, then once corrected."""
-    out = np.empty_like(field)
-    height, width = field.shape[:2]
-    shape = _grid_shape(height, width, step)
-    weight = np.empty(shape, np.float32)
-    gather(np.ones((height, width), np.float32), step, 1, weight)
-    for c in range(2):
-        part = np.ascontiguousarray(field[:, :, c])
-        total, grid, made = (
-            np.zeros(shape, np.float32),
-            np.zeros(shape, np.float32),
-            np.zeros((height, width), np.float32),
-        )
-        for _ in range(4):
-            gather(part - made, step, 1, total)
-            grid += total / np.maximum(weight, 1e-6)
-            spread(grid, step, made)
-        out[:, :, c] = made
+    """The smooth spline near a field (H, W, 2): averaged onto the grid with its own weights, corrected thrice."""
+    shape = field.shape[:2]
+    weight = np.maximum(_onto(np.ones(shape, np.float32), step), np.float32(1e-6))
+    grids = np.zeros((2, *weight.shape), np.float32)
+    made = np.zeros_like(field)
+    for _ in range(4):
+        for c in range(2):
+            grids[c] += _onto(np.ascontiguousarray(field[:, :, c] - made[:, :, c]), step) / weight
+        made = _pixels(grids, step, shape)
+    return made
+
+
+class _Compared(NamedTuple):
+    """What two frames say about a flow: Gauss-Newton's tensors and right side, squared residuals, 1 inside; (H, W).
+
+    noise : standard deviation of the residuals.
+    """
+
+    xx: Field
+    xy: Field
+    yy: Field
+    bx: Field
+    by: Field
+    square: Field
+    inside: Field
+    noise: float
+
+
+def _compared(first: Field, second: Field, flow: Field, places: Field) -> _Compared:
+    height, width = first.shape
+    x, y = cv2.split(flow + places)
+    inside = ((x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)).astype(np.float32)
+    warped = _warped(second, flow, places, cv2.INTER_CUBIC)
+    both = 0.5 * (warped + first)
+    gx = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 32.0)))
+    gy = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 32.0)))
+    rest = _unlit(warped - first)
+    some = rest[::3, ::3][inside[::3, ::3] > 0]
+    noise = 1.4826 * float(np.median(np.abs(some))) + 1e-6 if len(some) else 1.0
+    xx, xy, yy, bx, by, square = (np.empty((height, width), np.float32) for _ in range(6))
+    data_term(rest, inside, gx, gy, noise, xx, xy, yy, bx, by, square)
+    return _Compared(xx, xy, yy, bx, by, square, inside, noise)
+
+
+def _step(seen: _Compared, step: int, active: Field) -> Field:
+    """One step of Gauss-Newton on the vertices `active`: what is to be added to the flow."""
+    xx, yy = _onto(seen.xx, step, 2), _onto(seen.yy, step, 2)
+    stiff = _stiffness(xx, yy)
+    free = active / (np.stack((xx, yy)) + stiff)
+    right = np.stack((_onto(seen.bx, step), _onto(seen.by, step)))
+    move = np.clip(_solve(seen, right, free, stiff, step), -MOST, MOST)
+    return _pixels(np.asarray(move, np.float32), step, seen.inside.shape)
+
+
+def _covariance(seen: _Compared, step: int) -> Field:
+    """Of every pixel (H, W, 3), as its vertex alone would have it."""
+    xx, xy, yy = _onto(seen.xx, step, 2), _onto(seen.xy, step, 2), _onto(seen.yy, step, 2)
+    # how well the frames agree around a vertex; pixels outside say nothing: as bad as a whole grey
+    weight = _onto(np.ones_like(seen.inside), step)
+    variance = (_onto(seen.square, step) + (weight - _onto(seen.inside, step))) / np.maximum(weight, 1e-6)
+    variance = np.maximum(variance, np.float32(0.25 * seen.noise**2))
+    stiff = _stiffness(xx, yy)
+    xx, yy = xx + stiff, yy + stiff
+    grids = np.stack((yy, -xy, xx)) * (variance / (xx * yy - xy * xy))
+    return _pixels(np.asarray(grids, np.float32), step, seen.inside.shape)
+
+
+def _stiffness(xx: Field, yy: Field) -> np.float32:
+    return np.float32(STIFFNESS * float(np.mean(xx + yy)) + 1e-12)
+
+
+def _onto(field: Field, step: int, power: int = 1) -> Field:
+    grid = np.empty(_grid_shape(field.shape[0], field.shape[1], step), np.float32)
+    gather(field, step, power, grid)
+    return grid
+
+
+def _pixels(grids: Field, step: int, shape: tuple[int, ...]) -> Field:
+    """Splines (K, rows, columns) at all pixels: (H, W, K)."""
+    out = np.empty((*shape, len(grids)), np.float32)
+    part = np.empty(shape, np.float32)
+    for k, grid in enumerate(grids):
+        spread(np.ascontiguousarray(grid, np.float32), step, part)
+        out[:, :, k] = part
     return out
 
 
-def _improved(first: Field, second: Field, flow: Field, step: int) -> tuple[Field, Field]:
-    """One step of Gauss-Newton on the grid, added to a flow; and the covariance of every pixel."""
-    height, width = first.shape
-    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-    mx, my = x + flow[:, :, 0], y + flow[:, :, 1]
-    inside = ((mx >= 0) & (mx <= width - 1) & (my >= 0) & (my <= height - 1)).astype(np.float32)
-    warped = cv2.remap(second, mx, my, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    both = 0.5 * (warped + first)
-    gx = cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 32.0)
-    gy = cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 32.0)
-    difference = (warped - first)[inside > 0]
-    scale = 1.4826 * float(np.median(np.abs(difference))) + 1e-6 if len(difference) else 1.0
-    xx, xy, yy, bx, by, square = (np.empty((height, width), np.float32) for _ in range(6))
-    data_term(
-        first, np.asarray(warped, np.float32), inside, np.asarray(gx), np.asarray(gy), scale, xx, xy, yy, bx, by, square
-    )
-    shape = _grid_shape(height, width, step)
+def _solve(seen: _Compared, right: Field, free: Field, stiff: np.float32, step: int) -> Field:
+    """Conjugate gradients: (2, rows, columns) of coefficients.
 
-    def onto(field: Field, power: int = 1) -> Field:
-        grid = np.empty(shape, np.float32)
-        gather(field, step, power, grid)
-        return grid
+    free : the inverse of the diagonal, which preconditions; 0 for vertices that are held still.
+    """
 
-    dxx, dxy, dyy = onto(xx, 2), onto(xy, 2), onto(yy, 2)
-    stiff = np.float32(STIFFNESS * float(np.mean(dxx + dyy)) + 1e-12)
-    move = _solve(xx, xy, yy, onto(bx), onto(by), (dxx + stiff, dyy + stiff), stiff, step)
-    made = np.empty((height, width, 2), np.float32)
-    part = np.empty((height, width), np.float32)
-    for c in range(2):
-        spread(np.clip(move[c], -4.0, 4.0), step, part)
-        made[:, :, c] = part
-    # how well the frames agree around a vertex, over how much it sees there
-    weight, rest = onto(np.ones_like(first)), onto(square)
-    seen = onto(inside)
-    # pixels outside say nothing: as bad as a whole grey
-    variance = np.maximum((rest + (weight - seen)) / np.maximum(weight, 1e-6), 0.25 * scale * scale)
-    # far less than the stiffness: what holds the grid still says nothing about where it should be
-    least = 1e-3 * stiff
-    det = (dxx + least) * (dyy + least) - dxy * dxy
-    grids = (variance * (dyy + least) / det, -variance * dxy / det, variance * (dxx + least) / det)
-    covariance = np.empty((height, width, 3), np.float32)
-    for c, grid in enumerate(grids):
-        spread(np.ascontiguousarray(grid, np.float32), step, part)
-        covariance[:, :, c] = part
-    return flow + made, covariance
-
-
-def _solve(
-    xx: Field, xy: Field, yy: Field, bx: Field, by: Field, diagonal: tuple[Field, Field], stiff: np.float32, step: int
-) -> Field:
-    """Conjugate gradients, preconditioned by the diagonal: (2, rows, columns) of coefficients."""
+    # a cell is reached by the vertices of its four rows and columns
+    busy = np.ascontiguousarray(cv2.dilate((free[0] > 0).astype(np.uint8), FOUR, anchor=(0, 0))[:-3, :-3] > 0)
 
     def apply(v: Field) -> Field:
         out = np.empty_like(v)
-        normal_product(v, xx, xy, yy, step, out)
+        normal_product(v, busy, seen.xx, seen.xy, seen.yy, step, out)
         for c in range(2):
             out[c] += stiff * (v[c] - 0.25 * np.asarray(cv2.filter2D(v[c], -1, CROSS, borderType=cv2.BORDER_REPLICATE)))
         return out
 
-    rest = np.stack((bx, by))
-    inverse = 1.0 / np.stack(diagonal)
+    rest = right
     x = np.zeros_like(rest)
-    z = inverse * rest
+    z = free * rest
     p, now = z.copy(), float((rest * z).sum())
     for _ in range(SWEEPS):
         if now <= 1e-12:
@@ -176,23 +269,16 @@ def _solve(
         image = apply(p)
         along = now / max(float((p * image).sum()), 1e-20)
         x += np.float32(along) * p
-        rest -= np.float32(along) * image
-        z = inverse * rest
+        rest = rest - np.float32(along) * image
+        z = free * rest
         before, now = now, float((rest * z).sum())
         p = z + np.float32(now / before) * p
     return x
 
 
+FOUR = np.ones((4, 4), np.uint8)
 CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32)
 
 
 def _grid_shape(height: int, width: int, step: int) -> tuple[int, int]:
     return (height - 1) // step + 4, (width - 1) // step + 4
-
-
-def _even(first: Field, second: Field) -> tuple[Field, Field]:
-    """Grey frames on a scale from 0 to 1, alike for both."""
-    a, b = first.mean(axis=2), second.mean(axis=2)
-    low, high = np.percentile(a[::4, ::4], (0.5, 99.5))
-    scale = np.float32(1.0 / max(float(high - low), 1e-6))
-    return (a - np.float32(low)) * scale, (b - np.float32(low)) * scale

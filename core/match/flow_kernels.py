@@ -8,6 +8,7 @@ from numba import njit, types
 f32, i64 = types.float32, types.int64
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 W_F32_2D = f32[:, ::1]
+BOOL_2D = types.Array(types.boolean, 2, "C", readonly=True)
 F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # sums in any order, but what is not a number stays so
 
@@ -73,11 +74,14 @@ def gather(field, step, power, out):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.void(F32_3D, F32_2D, F32_2D, F32_2D, i64, f32[:, :, ::1]),
+    types.void(F32_3D, BOOL_2D, F32_2D, F32_2D, F32_2D, i64, f32[:, :, ::1]),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
-def normal_product(grid, xx, xy, yy, step, out):  # type: ignore[no-untyped-def]
-    """The normal equations times a displacement on the grid (2, rows, columns), without ever making their matrix."""
+def normal_product(grid, busy, xx, xy, yy, step, out):  # type: ignore[no-untyped-def]
+    """The normal equations times a displacement on the grid (2, rows, columns), without ever making their matrix.
+
+    busy : (rows - 3, columns - 3), the cells that a vertex which is not zero or not held still reaches.
+    """
     height, width = xx.shape
     columns = grid.shape[2]
     lu, lv, su, sv = (np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty(columns, np.float32),
@@ -86,6 +90,8 @@ def normal_product(grid, xx, xy, yy, step, out):  # type: ignore[no-untyped-def]
     out[:] = 0.0
     for y in range(height):
         j = y // step
+        if not busy[j].any():
+            continue
         w = table[y - j * step]
         for i in range(columns):
             lu[i] = (
@@ -96,6 +102,8 @@ def normal_product(grid, xx, xy, yy, step, out):  # type: ignore[no-untyped-def]
             )
             su[i] = sv[i] = 0.0
         for i in range((width + step - 1) // step):
+            if not busy[j, i]:
+                continue
             a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0.0)
             for k in range(min(step, width - i * step)):
                 t0, t1, t2, t3 = table[k, 0], table[k, 1], table[k, 2], table[k, 3]
@@ -126,19 +134,19 @@ def normal_product(grid, xx, xy, yy, step, out):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.void(F32_2D, F32_2D, F32_2D, F32_2D, F32_2D, f32, *([W_F32_2D] * 6)),
+    types.void(F32_2D, F32_2D, F32_2D, F32_2D, f32, *([W_F32_2D] * 6)),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
-def data_term(first, second, inside, gx, gy, scale, xx, xy, yy, bx, by, square):  # type: ignore[no-untyped-def]
-    """Gauss-Newton's tensors and right side per pixel for second - first, with Geman & McClure's weights.
+def data_term(rest, inside, gx, gy, scale, xx, xy, yy, bx, by, square):  # type: ignore[no-untyped-def]
+    """Gauss-Newton's tensors and right side per pixel for the residuals `rest`, with Geman & McClure's weights.
 
-    square : becomes the squared difference, 0 outside.
+    square : becomes the squared residual, 0 outside.
     """
-    height, width = first.shape
+    height, width = rest.shape
     limit = 1.0 / (9.0 * scale * scale)
     for y in range(height):
         for x in range(width):
-            r = second[y, x] - first[y, x]
+            r = rest[y, x]
             w = 1.0 / (1.0 + r * r * limit)
             w = w * w * inside[y, x]
             u, v = gx[y, x], gy[y, x]

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from core.match.flow import fitted, flow_between
-from core.match.flow_kernels import gather, spread
+from core.match.flow_kernels import gather, normal_product, spread
+from core.workers import Workers
 from tests.core.match.plates import texture
 
 HEIGHT, WIDTH = 120, 160
@@ -44,6 +45,41 @@ def test_where_there_is_nothing_to_see_the_flow_is_unsure():
     assert np.median(sigma[:, 100:150]) > 5 * np.median(sigma[20:100, 10:60])
 
 
+def test_light_that_changes_over_the_frame_is_no_motion():
+    first, second = pair(np.full_like(X, 1.7), np.full_like(X, -2.4))
+    second = second * np.float32(0.9) + np.float32(0.002) * X.astype(np.float32)[:, :, None]
+    flow = flow_between(first, second)
+    error = np.hypot(flow.vectors[:, :, 0] - 1.7, flow.vectors[:, :, 1] + 2.4)[INNER]
+    assert error.mean() < 0.1
+
+
+def test_an_edge_of_the_motion_stays_sharp_and_what_it_hides_is_unsure():
+    """A disc before a still wall moves 6 px: the grid alone would smear its edge over twice its spacing."""
+    disc = np.hypot(X - 80, Y - 60) < 30
+    wall, front = texture(X, Y), texture(X + 500, Y + 300)
+    gone = np.hypot(X - 86, Y - 60) < 30
+    first = np.where(disc[:, :, None], front, wall)
+    second = np.where(gone[:, :, None], texture(X + 494, Y + 300), wall)
+    flow = flow_between(*(np.float32(image / 255.0) for image in (first, second)))
+    truth = np.where(disc, 6.0, 0.0)
+    error = np.hypot(flow.vectors[:, :, 0] - truth, flow.vectors[:, :, 1])
+    hidden = gone & ~disc
+    inner = np.hypot(X - 80, Y - 60) < 24
+    assert np.median(error[~hidden]) < 0.05
+    assert error[inner].max() < 0.7
+    assert (error[~hidden] > 1.0).mean() < 0.05
+    sigma = np.sqrt(flow.covariance[:, :, 0] + flow.covariance[:, :, 2])
+    assert np.median(sigma[hidden]) > 20 * np.median(sigma[~hidden])
+
+
+def test_searches_in_threads_find_the_same():
+    first, second = pair(np.full_like(X, 1.7), np.full_like(X, -2.4))
+    workers = Workers(2)
+    flow = flow_between(first, second, ranges=workers.ranges)
+    workers.close()
+    np.testing.assert_array_equal(flow.vectors, flow_between(first, second).vectors)
+
+
 def test_spline_kernels_are_transposes_and_know_scattered_values():
     rng = np.random.default_rng(1)
     grid, field = rng.normal(size=(18, 23)).astype(np.float32), rng.normal(size=(HEIGHT, WIDTH)).astype(np.float32)
@@ -53,6 +89,26 @@ def test_spline_kernels_are_transposes_and_know_scattered_values():
     assert np.isclose((there * field).sum(dtype=float), (grid * back).sum(dtype=float), rtol=1e-3)
     ramp = np.stack((X, Y), axis=2).astype(np.float32)
     assert np.abs(fitted(ramp, 8) - ramp)[INNER].max() < 0.5
+
+
+def test_cells_that_no_free_vertex_reaches_add_nothing_to_the_normal_equations():
+    rng = np.random.default_rng(2)
+    xx, xy, yy = (rng.normal(size=(HEIGHT, WIDTH)).astype(np.float32) for _ in range(3))
+    grid = np.zeros((2, 18, 23), np.float32)
+    grid[:, 5, 7], grid[:, 17, 22] = 1.0, -2.0
+    u, v = (np.empty((HEIGHT, WIDTH), np.float32) for _ in range(2))
+    for part, field in zip(grid, (u, v), strict=True):
+        spread(part, 8, field)
+    expected = np.empty_like(grid)
+    for part, field in zip(expected, (xx * u + xy * v, xy * u + yy * v), strict=True):
+        gather(field, 8, 1, part)
+    made = np.empty_like(grid)
+    normal_product(grid, np.ones((15, 20), bool), xx, xy, yy, 8, made)
+    np.testing.assert_allclose(made, expected, atol=1e-3)
+    busy = np.zeros((15, 20), bool)
+    busy[2:6, 4:8] = busy[14:, 19:] = True  # the cells of the two vertices
+    normal_product(grid, busy, xx, xy, yy, 8, made)
+    np.testing.assert_allclose(made, expected, atol=1e-3)
 
 
 def test_flow_is_read_by_another_library(tmp_path):
