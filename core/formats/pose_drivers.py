@@ -203,6 +203,7 @@ def write_blender(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:
     path.write_text(BLENDER.format(
         name=item.name, vertices=len(item.mesh.points), joints=joints, inputs=made.inputs,
         rests={c.name: c.rest for c in rig.controls}, shapes=shapes, function=python_function(made),
+        dual=rig.skinning == "dual-quaternion",
     ), encoding="utf-8")
     return found.notes
 
@@ -253,7 +254,9 @@ def write_maya(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:
     path.write_text(MAYA.format(
         name=item.name, vertices=len(item.mesh.points), dials=dials, targets="".join(targets), body=json.dumps(body)
     ), encoding="utf-8")
-    return found.notes
+    if rig.skinning == "linear":
+        return found.notes
+    return (*found.notes, f"{item.name} is skinned with dual quaternions: set its skin cluster in Maya to them too.")
 
 
 def _mel_name(name: str) -> str:
@@ -296,6 +299,9 @@ def main():
     if len(mesh.data.vertices) != {vertices}:
         raise SystemExit("select the mesh with {vertices} vertices, imported without changing their order")
     armature = mesh.find_armature()
+    for modifier in mesh.modifiers:
+        if modifier.type == "ARMATURE":
+            modifier.use_deform_preserve_volume = {dual}
     frames = frames_of(armature)
     if mesh.data.shape_keys is None:
         mesh.shape_key_add(name="Basis", from_mix=False)

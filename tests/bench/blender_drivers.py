@@ -10,6 +10,7 @@ import json
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from tests.bench.blender_reads import peers_python
 
 TITLE = "Blender's surface with our drivers, against ours"
 KERNELS: tuple[Kernel, ...] = ("gaussian", "thin-plate", "multiquadric", "wendland", "shepard")
+Skinning = Literal["linear", "dual-quaternion"]
 ROUNDING = 2e-6  # of the size of the arm: Blender skins in single precision
 
 
@@ -41,11 +43,12 @@ def run() -> list[Row]:
     python = peers_python()
     if python is None:
         return []
-    return [_row(python, kernel, suffix) for suffix in (".usdc", ".glb") for kernel in KERNELS]
+    rows = [_row(python, kernel, suffix) for suffix in (".usdc", ".glb") for kernel in KERNELS]
+    return [*rows, _row(python, "gaussian", ".usdc", "dual-quaternion")]
 
 
-def _row(python: str, kernel: Kernel, suffix: str) -> Row:
-    item = _arm(kernel)
+def _row(python: str, kernel: Kernel, suffix: str, skinning: Skinning = "linear") -> Row:
+    item = _arm(kernel, skinning)
     assert item.rig is not None
     poses = _poses(item)
     skeleton = item.rig.skeleton
@@ -71,14 +74,15 @@ def _row(python: str, kernel: Kernel, suffix: str) -> Row:
         ours = evaluate(item.mesh.points, item.rig, item.correctives, pose)
         turned = np.stack([theirs[:, 0], theirs[:, 2], -theirs[:, 1]], axis=1)  # Blender's Z is up
         worst = max(worst, float(np.abs(turned - ours).max()) / size)
-    what = f"rig as {suffix}, {kernel}, {len(poses)} poses, largest difference of a vertex, of the size"
+    what = f"rig as {suffix}, {skinning}, {kernel}, {len(poses)} poses, largest difference of a vertex, of the size"
     return Row(what, worst, "", ROUNDING)
 
 
-def _arm(kernel: Kernel) -> MeshObject:
+def _arm(kernel: Kernel, skinning: Skinning) -> MeshObject:
     """The demo's arm with its sculpts, and one more over a joint and a dial; none of them is made after skinning."""
     model = arm(1)
-    model = model._replace(rig=model.rig.replace(skeleton=_in_frames_of_their_own(model.rig.skeleton)))
+    model = model._replace(rig=model.rig.replace(
+        skeleton=_in_frames_of_their_own(model.rig.skeleton), skinning=skinning))
     mesh, points = model.mesh.replace(uvs=None), model.mesh.points  # glTF would split vertices at seams of UVs
     swell = np.where(np.linalg.norm(points - (0.15, 0.03, 0.0), axis=1)[:, None] < 0.08, 0.004, 0.0)
     shapes = targets_from_dense(("swell",), [0], [1.0], [swell.astype(np.float32) * np.ones(3, np.float32)])

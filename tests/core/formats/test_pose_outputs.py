@@ -1,5 +1,6 @@
 """Posed rigs in the files of other programs, read back by readers that did not write them."""
 
+import json
 import math
 import re
 
@@ -13,10 +14,11 @@ from core.formats.pose_export import write, write_points
 from core.formats.rig_file import read_rig
 from core.pose.blend_shapes import dense_offsets
 from core.pose.corrective import as_kind
-from core.pose.pose import local_of_pose
+from core.pose.pose import Pose, local_of_pose
+from core.pose.rotation import euler_from_quaternion
 from core.pose.skinning import deformed, posed_points
 from core.pose.synthesis import evaluate, evaluate_at, pose_at, prepare
-from tests.core.formats.posed_samples import BENT, BOTH, ELSEWHERE, FLEXED, HALF, TWISTED, posed_arm
+from tests.core.formats.posed_samples import BENT, BOTH, ELSEWHERE, FLEXED, HALF, TWISTED, posed_arm, turned
 
 EARLY = (BENT, HALF, TWISTED, FLEXED, BOTH)  # none of which is corrected after skinning
 
@@ -178,6 +180,75 @@ def test_scripts_for_other_programs_compute_our_weights(options):
         scope = {**names, **values}
         exec(mel, scope)
         assert np.allclose([scope[name] for name in made.outputs], ours, atol=2e-6)
+
+
+def maya(text, rest, euler, moved, numbers):
+    """What Maya does with a script and a pose: deltas (V, 3) metres of its blendShape, by a small reading of MEL.
+
+    rest : by joint, metres. euler : XYZ degrees, and moved : metres from rest, by joint; numbers by dial.
+    """
+    assert text.count('"') % 2 == 0
+    head, body = re.search(r'^(.*)expression -name "filoplumeDrivers" -string (".*");$', text, re.DOTALL).groups()
+    dials = dict(re.findall(r"addAttr -longName (\w+) -attributeType double -defaultValue (\S+) ", head))
+    scene = {f"filoplume.{name}": float(rest_value) for name, rest_value in dials.items()}
+    assert set(numbers) <= set(dials)
+    scene |= {f"filoplume.{name}": value for name, value in numbers.items()}
+    for joint, place in rest.items():
+        for k, axis in enumerate("XYZ"):
+            scene[f"{joint}.rotate{axis}"] = euler.get(joint, (0.0, 0.0, 0.0))[k]
+            scene[f"{joint}.translate{axis}"] = 100.0 * (place[k] + moved.get(joint, (0.0, 0.0, 0.0))[k])
+    shares = {}
+    scope = {"exp": math.exp, "log": math.log, "sqrt": math.sqrt, "pow": math.pow, "sin": math.sin, "cos": math.cos,
+             "min": min, "max": max, "deg_to_rad": math.radians, "scene": scene, "shares": shares}
+    for line in json.loads(body).splitlines():
+        for statement in filter(None, line.split(";")):
+            if re.fullmatch(r" ?float \$\w+", statement):
+                continue  # declared
+            word = re.sub(r"filoplumeShapes\.weight\[(\d+)\]", r"shares[\1]", statement.removeprefix("float "))
+            word = re.sub(r"(?<![\w$.])([A-Za-z_]\w*\.[A-Za-z_]\w*)", r'scene["\1"]', word)
+            exec(re.sub(r"\$(\w+)", r"v_\1", word), scope)
+    found = np.zeros((10_000, 3))
+    points = re.findall(r'TargetGroup\[(\d+)\].*inputPointsTarget"\) -type "pointArray" (\d+) (.*);', head)
+    places = re.findall(r'TargetGroup\[(\d+)\].*inputComponentsTarget"\) -type "componentList" (\d+) (.*);', head)
+    assert [p[:2] for p in points] == [p[:2] for p in places]
+    assert [int(p[0]) for p in points] == sorted(shares)
+    for (row, count, moves), (_, _, names) in zip(points, places, strict=True):
+        vertices = [int(v) for v in re.findall(r'"vtx\[(\d+)\]"', names)]
+        offsets = np.array([float(x) for x in moves.split()]).reshape(-1, 4)
+        assert len(vertices) == len(offsets) == int(count)
+        assert (offsets[:, 3] == 1.0).all()
+        found[vertices] += 0.01 * shares[int(row)] * offsets[:, :3]
+    return found
+
+
+@pytest.mark.parametrize("kernel", ["gaussian", "thin-plate", "shepard"])
+def test_the_script_for_maya_gives_our_corrections_at_every_pose(kernel, tmp_path):
+    made = posed_arm((*EARLY[:-1], BOTH.replace(translations={"wrist": (0.0, 0.02, 0.01)})), kernel=kernel)
+    write(tmp_path / "arm.mel", made, 24.0)
+    text, skeleton = (tmp_path / "arm.mel").read_text(), made.rig.skeleton
+    rest = dict(zip(skeleton.names, skeleton.rest[:, :3, 3], strict=True))
+    found, rng = corrective_shapes(made), np.random.default_rng(3)
+    poses = [*(s.pose for layer in made.correctives.layers for s in layer.space.samples), Pose()]
+    poses += [Pose(rotations={j: turned(*rng.uniform(-170, 170, 3)) for j in ("elbow", "wrist")},
+                   translations={"wrist": (0.01, 0.0, -0.03)}, numbers={"strain": float(rng.uniform(-1, 1))})
+              for _ in range(6)]
+    for pose in poses:
+        euler = {j: np.degrees(euler_from_quaternion(q)) for j, q in pose.rotations.items()}
+        theirs = maya(text, rest, euler, pose.translations, {n: v for n, v in pose.numbers.items() if n == "strain"})
+        ours = np.zeros((len(made.mesh.points), 3))
+        for shape, weight in zip(found.shapes, shape_weights_at(found, made, pose), strict=True):
+            ours[shape.vertices] += weight * shape.offsets
+        assert np.abs(theirs[: len(ours)] - ours).max() <= 1e-7, pose
+
+
+def test_programs_are_told_of_dual_quaternions(item, tmp_path):
+    dual = item.replace(rig=item.rig.replace(skinning="dual-quaternion"))
+    assert "dual quaternions" in write(tmp_path / "arm.mel", dual, 24.0)[0]
+    assert "dual quaternions" in write(tmp_path / "arm.glb", dual, 24.0)[0]
+    write(tmp_path / "arm.py", dual, 24.0)
+    assert "preserve_volume = True" in (tmp_path / "arm.py").read_text()
+    write(tmp_path / "arm.usdc", dual, 24.0)
+    assert read_rig(tmp_path / "arm.usdc").rig.skinning == "dual-quaternion"
 
 
 def test_scripts_are_whole(item, tmp_path):
