@@ -166,5 +166,6 @@ def _with_coat(document: Document, groom_id: int, coat: Coat) -> Document:
 
 
 def _changed_label(old: Coat, new: Coat) -> str:
-    return next((known.label.lower() for name, known in COAT_FIELDS.items()
-                 if getattr(old, name) is not getattr(new, name)), "")
+    labels = [known.label.lower() for name, known in COAT_FIELDS.items()
+              if getattr(old, name) is not getattr(new, name)]
+    return labels[0] if len(labels) == 1 else f"{len(labels)} values"

@@ -42,6 +42,7 @@ class NumberBar(FieldWidget):
         self.whole = whole
         self.scale = scale_of(known, unit, whole)
         self.line: MathEdit | None = None
+        self.gathered = False
         self._press: QPointF | None = None
         self._last_x = 0.0
         self._free = 0.0  # the value of the drag before steps and rounding
@@ -98,7 +99,7 @@ class NumberBar(FieldWidget):
         return f" From {self.words_of(self.known.hard[0])} to {self.words_of(self.known.hard[1])}."
 
     def gestures(self) -> str:
-        return "Drag (Shift fine, Ctrl steps) · double-click to type, with units · right button for more"
+        return "Drag (Shift fine, Ctrl steps, down first: several) · double-click to type · right button: reset, copy"
 
     def clipboard_text(self) -> str:
         unit = "deg" if self.scale.unit == "°" else self.scale.unit
@@ -161,7 +162,7 @@ class NumberBar(FieldWidget):
             event.ignore()
             return
         self.finish()
-        self._press, self._last_x, self._free = event.position(), event.position().x(), float(self._value)
+        self._press, self._last_x = event.position(), event.position().x()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._press is None or not event.buttons() & Qt.MouseButton.LeftButton:
@@ -171,17 +172,35 @@ class NumberBar(FieldWidget):
             if abs(x - self._press.x()) < DRAG_STARTS:
                 return
             self.begin()
-        low, high = self.soft
         held_keys = event.modifiers()
         way = FINE if held_keys & Qt.KeyboardModifier.ShiftModifier else 1.0
-        self._free += (x - self._last_x) / max(self.width() - 2, 1) * (high - low) * way
-        self._last_x = x
+        share, self._last_x = (x - self._last_x) / max(self.width() - 2, 1), x
+        self.slide(share * way, bool(held_keys & Qt.KeyboardModifier.ControlModifier))
+
+    def begin(self) -> None:
+        if not self._open:
+            self._free = float(self._value)
+        super().begin()
+
+    def slide(self, share: float, steps: bool = False) -> None:
+        """Go on by a share of the bar, within its soft range or to where the edit began; `steps` snaps."""
+        low, high = self.soft
         start = float(self._start)
-        self._free = min(max(self._free, min(low, start)), max(high, start))
+        self._free = min(max(self._free + share * (high - low), min(low, start)), max(high, start))
         value = self._free
-        if held_keys & Qt.KeyboardModifier.ControlModifier:
+        if steps:
             value = min(max(round(value / self.step) * self.step, low), high)
-        self.preview(self._made(value))
+        self.preview(self.made(value))
+
+    def let_go(self) -> None:
+        """Forget the press: what the hand does now is not for this bar alone."""
+        self._press = None
+
+    def set_gathered(self, gathered: bool) -> None:
+        """Show that the hand holds this bar with others."""
+        if gathered != self.gathered:
+            self.gathered = gathered
+            self.update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -231,16 +250,15 @@ class NumberBar(FieldWidget):
     def _nudge(self, count: float, modifiers: Qt.KeyboardModifier) -> None:
         if not self._open:
             self.begin()
-            self._free = float(self._value)
         if modifiers & Qt.KeyboardModifier.ControlModifier:
             self._free += count * self.step
         else:
             self._free += count * self.nudge * (FINE if modifiers & Qt.KeyboardModifier.ShiftModifier else 1.0)
         low, high = self.known.hard or self.soft
         self._free = min(max(self._free, low), high)
-        self.preview(self._made(self._free))
+        self.preview(self.made(self._free))
 
-    def _made(self, value: float) -> float:
+    def made(self, value: float) -> float:
         """A number of the hand as it is stored: without the noise of its arithmetic."""
         return held(float(f"{value:.7g}"), self.known, self.whole)
 
@@ -263,6 +281,10 @@ class NumberBar(FieldWidget):
             busy = self._open or (self.underMouse() and self.isEnabled())
             paint_fill(painter, inside, part, look.theme.colour("fill_hover" if busy else "fill",
                                                                 1.0 if self.isEnabled() else 0.35))
+        if self.gathered:
+            painter.setPen(look.theme.colour("accent"))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 4.5, 4.5)
         painter.setPen(self.ink(look))
         painter.drawText(inside.adjusted(8, 0, -7, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
                          self.words())

@@ -10,6 +10,7 @@ import msgspec
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.window.bars_together import BarsTogether
 from app.window.choice_bar import ChoiceBar, SwitchBar, TextField
 from app.window.color_field import ColorField
 from app.window.field_widget import FieldWidget
@@ -45,11 +46,14 @@ class RecordForm(QWidget):
     def __init__(self, record: Record, setting: Setting = Setting(), parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._record, self._before, self._setting = record, record, setting
+        self._changes: dict[str, Any] = {}  # of the edit that goes on, which may be of several fields
         self.fields: dict[str, FieldWidget | ValueField] = {}
         self.rows: dict[str, Row] = {}
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
+        together = BarsTogether(self)
+        together.ended.connect(self._finish)
         kind = type(record)
         defaults = {f.name: f.default for f in msgspec.structs.fields(kind)}
         hints = get_type_hints(kind, include_extras=True)
@@ -62,6 +66,9 @@ class RecordForm(QWidget):
             row.label.setToolTip(f"<p style='white-space:normal'>{known.tooltip}</p>")
             column.addWidget(row)
             self.fields[name], self.rows[name] = widget, row
+            bar = widget.bar if isinstance(widget, ValueField) else widget
+            if isinstance(bar, NumberBar):
+                together.add(bar, row.label)
 
     @property
     def editing(self) -> bool:
@@ -98,13 +105,23 @@ class RecordForm(QWidget):
                 widget.set_unit(setting.unit)
 
     def _edited(self, name: str, value: Any, final: bool) -> None:
-        before = getattr(self._before, name)
-        back = value is before or (not isinstance(value, Record) and value == before)
-        self._record = self._before if back else self._before.replace(**{name: value})
-        record = self._record
-        if final:
-            self._before = record
-        self.changed.emit(record, final)
+        self._changes[name] = value
+        changed = {n: made for n, made in self._changes.items() if not _same(made, getattr(self._before, n))}
+        self._record = self._before.replace(**changed) if changed else self._before
+        if final and not self.editing:
+            self._finish()
+        else:
+            self.changed.emit(self._record, False)
+
+    def _finish(self) -> None:
+        """What was changed since the last time is final, of one field or of several."""
+        if self._changes:
+            self._before, self._changes = self._record, {}
+            self.changed.emit(self._record, True)
+
+
+def _same(one: Any, other: Any) -> bool:
+    return one is other or (not isinstance(one, Record) and bool(one == other))
 
 
 class MapBar(ChoiceBar):

@@ -403,3 +403,70 @@ def _shares(image: QImage) -> dict[tuple[int, ...], float]:
     pixels = np.frombuffer(image.constBits(), np.uint8).reshape(-1, 4)[:, 2::-1].copy()
     colours, counts = np.unique(pixels, axis=0, return_counts=True)
     return {tuple(int(c) for c in row): n / len(pixels) for row, n in zip(colours, counts, strict=True)}
+
+
+def sweep(first: QWidget, last: QWidget, way: float, release: bool = True) -> None:
+    """Press on a widget, go down to another, then to the side by a share of the width of a bar."""
+    start, end = (QPointF(w.mapToGlobal(QPointF(20.0, 0.5 * w.height()))) for w in (first, last))
+    end.setX(start.x())
+    places = [start, 0.5 * (start + end), end, end + QPointF(11.0, 0.0)]
+    places += [places[-1] + QPointF(part * way * 200.0, 0.0) for part in (0.5, 1.0) if way]
+    for number, place in enumerate(places if way else places[:3]):
+        kind = QEvent.Type.MouseMove if number else QEvent.Type.MouseButtonPress
+        QApplication.sendEvent(first, QMouseEvent(
+            kind, QPointF(first.mapFromGlobal(place)), place, Qt.MouseButton.NoButton if number else LEFT, LEFT, NONE))
+    if release:
+        QApplication.sendEvent(first, QMouseEvent(
+            QEvent.Type.MouseButtonRelease, QPointF(first.mapFromGlobal(place)), place, LEFT,
+            Qt.MouseButton.NoButton, NONE))
+
+
+@pytest.mark.parametrize("on_label", [False, True])
+def test_a_drag_down_over_bars_and_then_sideways_changes_them_all_in_one_step(
+    qtbot: QtBot, desk: Desk, on_label: bool,
+) -> None:
+    panel = CoatPanel(desk)
+    shown(qtbot, panel)
+    assert panel.form is not None
+    form, session, before = panel.form, desk.session, desk.document
+    bars = {name: form.fields[name].bar for name in ("density", "length", "width_root")}  # type: ignore[union-attr]
+    old = {name: bar.value() for name, bar in bars.items()}
+    share = 200.0 / (bars["length"].width() - 2)
+    sweep(form.rows["length"].label if on_label else bars["length"], bars["width_root"], -0.2)
+    coat = desk.document.grooms[0].coat
+    for name in ("length", "width_root"):
+        low, high = bars[name].soft
+        wanted = max(old[name] - 0.2 * share * (high - low), low)
+        assert getattr(coat, name).base.number == pytest.approx(wanted, rel=1e-3)
+    assert coat.density is before.grooms[0].coat.density
+    assert session.history.undo_name == "Coat 2 values"
+    session.undo()
+    assert desk.document is before
+    sweep(bars["length"], bars["width_root"], 0.3, release=False)
+    assert session.document is not before
+    QTest.keyClick(bars["length"], Qt.Key.Key_Escape)
+    assert session.document is before
+    assert {name: bar.value() for name, bar in bars.items()} == old
+    sweep(bars["length"], bars["length"], 0.2)
+    assert session.history.undo_name == "Coat length"
+
+
+def test_a_drag_over_bars_that_is_let_go_types_one_number_into_all(qtbot: QtBot, desk: Desk) -> None:
+    panel = CoatPanel(desk)
+    shown(qtbot, panel)
+    assert panel.form is not None
+    before, form = desk.document, panel.form
+    bars = {name: form.fields[name].bar for name in ("clump", "frizz", "length_variation")}  # type: ignore[union-attr]
+    for words, key in (("0.25", Qt.Key.Key_Return), ("0.75", Qt.Key.Key_Escape)):
+        sweep(bars["clump"], bars["length_variation"], 0.0)
+        assert bars["clump"].line is not None
+        assert bars["frizz"].gathered
+        bars["clump"].line.selectAll()
+        QTest.keyClicks(bars["clump"].line, words)
+        QTest.keyClick(bars["clump"].line, key)
+        qtbot.waitUntil(lambda: not bars["frizz"].gathered)
+        assert [bar.value() for bar in bars.values()] == [0.25] * 3
+        assert not form.editing
+    assert desk.session.history.undo_name == "Coat 3 values"
+    desk.session.undo()
+    assert desk.document is before
