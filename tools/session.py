@@ -118,6 +118,11 @@ class Session:
         return None if self._journal is None else self._journal.error
 
     @property
+    def autosaved(self) -> float | None:
+        """When the work was last safe in the journal, in seconds of ``time.monotonic``; None before that."""
+        return None if self._journal is None else self._journal.written
+
+    @property
     def stroking(self) -> bool:
         """True while a stroke goes on: a good time to do nothing else."""
         return self.hand.stroking

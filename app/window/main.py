@@ -34,6 +34,7 @@ from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
+from app.window.memory import give_back_freed_memory
 from app.window.opening import Opening
 from app.window.outliner import Outliner
 from app.window.palette import Palette
@@ -337,6 +338,7 @@ class MainWindow(QMainWindow):
             self._console.setObjectName("console")
             self._console.setWidget(Console(self.desk))
             self.addDockWidget(Qt.DockWidgetArea.BottomDockWidgetArea, self._console)
+            self.resizeDocks([self._console], [self.height() // 4], Qt.Orientation.Vertical)
             return
         self._console.setVisible(not self._console.isVisible())
 
@@ -434,6 +436,7 @@ class MainWindow(QMainWindow):
         self._show_panels()
         self._show_title()
         self._show_middle()
+        self.when_settled(give_back_freed_memory)
 
     def _document_changed(self, old: Document, new: Document) -> None:
         if self.desk.session.stroking:
@@ -492,6 +495,7 @@ class MainWindow(QMainWindow):
         self.desk.session.changed = None
         self.desk.session.close(discard=not self._keeps_place)
         self.crash_watch.close()
+        give_back_freed_memory()
         event.accept()
 
 

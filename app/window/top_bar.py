@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt, QTimer
@@ -14,6 +15,7 @@ from app.window.hotkeys import Hotkeys
 from app.window.icons import paint_icon
 from app.window.theme import look_of, text_font
 
+LITTLE = 5.0  # seconds between two words about the autosave
 LOOK_AGAIN = 400  # ms after a change, when the autosave has had its time
 ABOUT = {
     "File": "file", "Edit": "edit", "View": "view", "Tools": "tool", "Groom": "groom", "Time": "frame",
@@ -38,7 +40,8 @@ class TopBar(QWidget):
         self.crafts = CraftSwitch(desk)
         self.file = QLabel()
         self.palette_field = FindField(lambda: commands.run("window.palette"), hotkeys)
-        self._again = QTimer(self, singleShot=True, interval=LOOK_AGAIN)
+        self.clock = time.monotonic
+        self._again = QTimer(self, singleShot=True)
         self._again.timeout.connect(self.refresh)
         line = QHBoxLayout(self)
         line.setContentsMargins(12, 4, 8, 4)
@@ -60,9 +63,16 @@ class TopBar(QWidget):
         name = "Not saved yet" if session.path is None else session.path.name
         if not session.document.meshes and session.path is None:
             name = ""
-        trouble = session.autosave_error
-        state = "" if not name else "saved" if session.saved and session.path else \
-            "autosave fails" if trouble else "autosaved"
+        trouble, written = session.autosave_error, session.autosaved
+        state = ""
+        if name and session.saved and session.path:
+            state = "saved"
+        elif name and trouble:
+            state = "autosave fails"
+        elif name and written is not None:
+            past = max(self.clock() - written, 0.0)
+            state = ago(past)
+            self._again.start(LOOK_AGAIN + round(1e3 * (LITTLE if past < 60.0 else 60.0)))  # when it is another
         self.file.setText(f"{name}  •  {state}" if state else name)
         self.file.setToolTip(
             str(trouble) if trouble else
@@ -76,6 +86,7 @@ class TopBar(QWidget):
         self.name.setStyleSheet(f"color: {look.theme.accent}")
         self.crafts.take_look()
         self.file.setStyleSheet(f"color: {look.theme.dim}")
+        self.file.setFont(text_font(look, look.small))
 
     def menu(self) -> QMenu:
         """All commands by category."""
@@ -104,7 +115,7 @@ class TopBar(QWidget):
         menu.setActiveAction(menu.actions()[0])
 
     def _soon(self) -> None:
-        self._again.start()
+        self._again.start(LOOK_AGAIN)
 
 
 class CraftSwitch(QWidget):
@@ -176,6 +187,15 @@ class FindField(QWidget):
         painter.drawText(inside, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, "Find a command…")
         painter.drawText(inside, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight,
                          self._hotkeys.keymap.shown("window.palette"))
+
+
+def ago(seconds: float) -> str:
+    """How long ago the work was autosaved, in steps that do not fidget."""
+    if seconds < LITTLE:
+        return "autosaved"
+    if seconds < 60.0:
+        return f"autosaved {seconds // LITTLE * LITTLE:.0f} s ago"
+    return f"autosaved {seconds // 60.0:.0f} min ago"
 
 
 def _bold(font: object) -> object:

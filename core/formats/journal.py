@@ -70,6 +70,7 @@ class Journal:
     `patience` seconds) until the one before it is safe, so a crash loses at most the newest.
 
     error : why the last attempt failed, or None. Work goes on without a journal; the next commit tries again.
+    written : when a state was last safe on disk, in seconds of ``time.monotonic``, or None.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class Journal:
         patience: float = 0.25,
     ) -> None:
         self.error: UserError | None = None
+        self.written: float | None = None
         self.folder = folder or state_folder()
         self.token = f"{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}-{secrets.token_hex(4)}"
         self._hashes = hashes or ArrayHashes()
@@ -157,7 +159,7 @@ class Journal:
                 f"The autosave in {self.folder} failed ({why}): save your work now, elsewhere if this disk is full."
             )
         else:
-            self._durable, self.error = wanted.sequence, None
+            self._durable, self.error, self.written = wanted.sequence, None, time.monotonic()
 
     def _write(self, wanted: _Wanted) -> None:
         too_long = self._file is not None and self._file.tell() > max(self._generation_bytes, 4 * self._start_bytes)

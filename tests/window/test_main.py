@@ -42,6 +42,13 @@ def test_the_title_and_the_top_say_whether_work_is_saved(hand: Hand, tmp_path: P
     assert not window.isWindowModified()
     hand.drag(BACK, ASIDE)
     assert window.isWindowModified()
+    written = window.desk.session.autosaved
+    hand.until(lambda: window.desk.session.autosaved is not None)
+    assert written is None or written <= window.desk.session.autosaved
+    for past, words in ((2.0, "autosaved"), (43.0, "autosaved 40 s ago"), (250.0, "autosaved 4 min ago")):
+        window.top.clock = lambda past=past: window.desk.session.autosaved + past
+        window.top.refresh()
+        assert window.top.file.text().endswith(f"•  {words}")
     window.files.save_as(tmp_path / "mine.filo")
     assert not window.isWindowModified()
     assert "mine.filo" in window.windowTitle()
@@ -50,6 +57,14 @@ def test_the_title_and_the_top_say_whether_work_is_saved(hand: Hand, tmp_path: P
     saved, _ = read_project(tmp_path / "mine.filo")
     assert (saved.grooms[0].guides.points == window.desk.document.grooms[0].guides.points).all()
     assert load_settings().settings.recent == (str(tmp_path / "mine.filo"),)
+
+
+def test_the_console_leaves_the_view_its_room(hand: Hand) -> None:
+    window = hand.window
+    window.show_console()
+    hand.until(lambda: 0 < window._console.height() <= 0.27 * window.height())
+    hand.rest()
+    assert window._console.height() <= 0.27 * window.height()
 
 
 def test_closing_keeps_unsaved_work_for_the_next_start(opened: Opened, animal: Document) -> None:
