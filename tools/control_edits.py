@@ -39,25 +39,30 @@ def add_joint_control(
 
 
 def add_geometry_control(
-    document: Document, mesh_id: int, name: str, vertices: Sequence[int] | None = None,
-    axis: Vector = (0.0, 1.0, 0.0), travel: float = 1.0, low: float = 0.0, high: float = 1.0,
+    document: Document, mesh_id: int, name: str, vertices: Sequence[int], axis: Vector = (0.0, 1.0, 0.0),
+    travel: float = 1.0, low: float = 0.0, high: float = 1.0,
 ) -> Document:
     """The document with a piece of the mesh as a control: its number is how far the piece has moved along `axis`.
 
     Parameters
     ----------
-    vertices : of the piece; None for those that the mask covers.
-    travel : metres that raise the number by 1.
+    vertices : of the piece. travel : metres that raise the number by 1.
     """
-    item, _ = rigged(document, mesh_id)
-    if vertices is None:
-        vertices = [] if item.mask is None else np.flatnonzero(item.mask >= PIECE).tolist()
-        if not vertices:
-            raise UserError("Nothing is masked; paint the mask over the piece of geometry that should be the control.")
     piece = freeze(np.unique(np.asarray(vertices, np.int64)).astype(np.int32))
     return add_control(document, mesh_id, _control(
         name=name, kind="geometry", vertices=piece, axis=axis, travel=travel, low=low, high=high,
         rest=_at_rest(low, high)))
+
+
+def add_masked_control(
+    document: Document, mesh_id: int, name: str, axis: Vector = (0.0, 1.0, 0.0), travel: float = 1.0
+) -> Document:
+    """As :func:`add_geometry_control`, of the piece that the mask covers."""
+    item, _ = rigged(document, mesh_id)
+    piece = [] if item.mask is None else np.flatnonzero(item.mask >= PIECE).tolist()
+    if not piece:
+        raise UserError("Nothing is masked; paint the mask over the piece of geometry that should be the control.")
+    return add_geometry_control(document, mesh_id, name, piece, axis, travel)
 
 
 def add_dial(
@@ -74,14 +79,14 @@ def add_pad(document: Document, mesh_id: int, across: str, up: str, reach: float
     return document
 
 
-def edit_control(document: Document, mesh_id: int, name: str, **changes: Any) -> Document:
+def edit_control(document: Document, mesh_id: int, control: str, **changes: Any) -> Document:
     """The document with fields of a control changed: name, rest, low, high, axis, travel. Sculpts are met as before.
 
     Poses, clips and spaces that read it know it by its new name. The range of a shape of the rig may change, its name
     may not.
     """
     item, rig = rigged(document, mesh_id)
-    old = _named(rig, name)
+    old, name = _named(rig, control), control
     if rig.shapes is not None and name in rig.shapes.names and changes.get("name", name) != name:
         raise UserError(f"{name!r} is a shape of the rig's file and keeps its name; make a dial beside it instead.")
     try:
@@ -100,6 +105,13 @@ def edit_control(document: Document, mesh_id: int, name: str, **changes: Any) ->
         made = refresh(item.mesh.points, changed.rig, changed.correctives.replace(layers=layers))
         changed = changed.replace(correctives=made.correctives)
     return with_mesh(document, changed)
+
+
+def change_control(
+    document: Document, mesh_id: int, name: str, to: str, low: float, high: float, rest: float
+) -> Document:
+    """As :func:`edit_control`, of the name (kept where `to` is empty), the range and the rest at once."""
+    return edit_control(document, mesh_id, name, name=to.strip() or name, low=low, high=high, rest=rest)
 
 
 def remove_control(document: Document, mesh_id: int, name: str) -> Document:

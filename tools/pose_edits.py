@@ -18,6 +18,7 @@ from core.document import Document, MeshObject, find_mesh, with_mesh
 from core.errors import UserError
 from core.formats.pose_json import read_sculpt
 from core.formats.sculpt_topology import check_topology
+from core.leaves import same_bits
 from core.pose import edit_layers
 from core.pose.carry import carried_surface, mirrored_surface
 from core.pose.clip import onto_skeleton, resampled
@@ -74,6 +75,11 @@ def add_sculpt(
             return add_sculpt(document, mesh_id, pose, surface, falloffs, dofs, twins=twins, **options)
         return _merged_into(document, mesh_id, others[0], pose, surface)
     return with_mesh(document, item.replace(correctives=made.correctives))
+
+
+def add_sculpt_as_seen(document: Document, mesh_id: int, pose: Pose, twins: Twins = "refuse") -> Document:
+    """The document with a pose made a sample, its surface as the layers give it; `twins` as of :func:`add_sculpt`."""
+    return add_sculpt(document, mesh_id, pose, twins=twins)
 
 
 def import_sculpt(document: Document, mesh_id: int, pose: Pose, path: str | Path) -> Document:
@@ -248,7 +254,7 @@ def hold_pose(document: Document, mesh_id: int, pose: Pose | None) -> Document:
     item, rig = rigged(document, mesh_id)
     if pose is not None:
         pose = without_noise(rig, constrained(rig.skeleton, rig.constraints, pose))
-    return document if pose == item.pose else with_mesh(document, item.replace(pose=pose))
+    return document if same_bits(pose, item.pose) else with_mesh(document, item.replace(pose=pose))
 
 
 def select_joints(document: Document, mesh_id: int, names: Sequence[str]) -> Document:
@@ -264,8 +270,10 @@ def select_joints(document: Document, mesh_id: int, names: Sequence[str]) -> Doc
 def keep_pose(document: Document, mesh_id: int, pose: Pose) -> Document:
     """The document with a pose in the library; it takes the place of the one of its name."""
     item, _ = rigged(document, mesh_id)
-    others = tuple(known for known in item.library if known.name != pose.name)
-    return with_mesh(document, item.replace(library=(*others, pose)))
+    known = [one.name for one in item.library]
+    library = tuple(pose if one.name == pose.name else one for one in item.library)
+    library = library if pose.name in known else (*library, pose)
+    return document if same_bits(library, item.library) else with_mesh(document, item.replace(library=library))
 
 
 def forget_pose(document: Document, mesh_id: int, name: str) -> Document:

@@ -20,6 +20,8 @@ from core.workspace import Workspace
 from tools.groom.actions import ACTIONS, act
 from tools.hand import Hand
 from tools.macro import Macro
+from tools.pose.actions import ACTIONS as POSE_ACTIONS
+from tools.pose.actions import scene_of
 from tools.registry import Registry
 from tools.tool import Tool
 
@@ -220,16 +222,20 @@ class Session:
         if self.recording is not None and self.history.current is not before:
             self.recording.edited(name, function, args, parameters)
 
-    def act(self, name: str, **params: Any) -> None:
-        """Do an action of :data:`tools.groom.actions.ACTIONS` to the active groom, as one named step.
+    def act(self, name: str, /, **params: Any) -> None:
+        """Do an action to the active groom (``tools.groom.actions``) or mesh (``tools.pose.actions``), as one step.
 
         Raises
         ------
         UserError
-            There is no such action or no groom, it is locked or hidden, or there is nothing to do it to.
+            There is no such action, no groom or rig, it is locked or hidden, or there is nothing to do it to.
         """
+        if name in POSE_ACTIONS:
+            self._act_on_mesh(name, params)
+            return
         if name not in ACTIONS:
-            raise UserError(f"There is no action named {name!r}; choose one of {', '.join(ACTIONS)}.")
+            raise UserError(
+                f"There is no action named {name!r}; choose one of {', '.join([*ACTIONS, *POSE_ACTIONS])}.")
         action = ACTIONS[name]
         record = action.make(params)
         self.hand.cancel()
@@ -239,6 +245,14 @@ class Session:
         self.commit(action.step, done)
         if done is not document and self.recording is not None:
             self.recording.acted(name, params, groom.id, respect)
+
+    def _act_on_mesh(self, name: str, params: dict[str, Any]) -> None:
+        action = POSE_ACTIONS[name]
+        record = action.make(params)
+        self.hand.cancel()
+        self.cancel()
+        scene = scene_of(self.history.current, self.mesh.id, self.workspace.frame)
+        self.edit(action.step, action.edit, scene.item.id, *action.arguments(scene, record))
 
     def undo(self) -> None:
         """Go back one step (a preview is given up first)."""

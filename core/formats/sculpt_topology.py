@@ -48,10 +48,10 @@ def check_topology(path: Path, mesh: Mesh, rig: Rig) -> None:
         number = int(np.flatnonzero(found.face_of_file == first)[0])
         start = 1 if path.suffix.lower() == ".obj" else 0
         corners = found.mesh.corners[slice(*_ends(found.mesh, first))]
-        vertices = ", ".join(str(int(np.flatnonzero(found.vertex_of_file == v)[0]) + start) for v in corners)
+        vertices = sorted(int(np.flatnonzero(found.vertex_of_file == v)[0]) + start for v in corners)
         raise UserError(
-            f"{counts}; its face {number + start} joins the vertices {vertices} (counted from {start}), which no face "
-            f"of the rig does: {ADVICE}.")
+            f"{counts}; its face {number + start} joins the vertices {str(vertices)[1:-1]} (counted from {start}), "
+            f"which no face of the rig does: {ADVICE}.")
     missing = int((~np.isin(mine, its)).sum())
     if missing > found.faces - len(found.mesh.counts):
         raise UserError(f"{counts}; {missing:,} faces of the rig are not in it: {ADVICE}.")

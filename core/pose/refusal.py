@@ -28,6 +28,11 @@ class Refusal(UserError):
     poses : the names of the guilty ones, in the order of the space. reason : what they did.
     """
 
+    @property
+    def offers(self) -> tuple[str, ...]:
+        """What may be done about it with the poses: "merge", "delete", "move"."""
+        return ("move",) if self.reason == "coplanar" else ("merge", "delete", "move")
+
     def __init__(self, reason: Reason, poses: tuple[str, ...], detail: str = "") -> None:
         self.reason, self.poses = reason, tuple(dict.fromkeys(poses))
         quoted = [repr(p) for p in self.poses]

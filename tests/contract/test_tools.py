@@ -16,6 +16,7 @@ from core.leaves import same_bits
 from core.workspace import Respect, Workspace
 from tests.tools.scenes import BENT, guides_of, pointers, session, sight
 from tools.groom.actions import ACTIONS
+from tools.pose.actions import ACTIONS as POSE_ACTIONS
 from tools.registry import Registry
 from tools.tool import Pointer, Turn
 
@@ -101,9 +102,13 @@ def test_the_settings_of_a_tool_are_described(name):
         REGISTRY.make(name, {"no_such_setting": 1})
 
 
-@pytest.mark.parametrize("name", ACTIONS)
+def test_no_two_actions_have_one_name():
+    assert not ACTIONS.keys() & POSE_ACTIONS.keys()
+
+
+@pytest.mark.parametrize("name", [*ACTIONS, *POSE_ACTIONS])
 def test_an_action_describes_itself(name):
-    action = ACTIONS[name]
+    action = {**ACTIONS, **POSE_ACTIONS}[name]
     assert action.name == name
     assert action.label
     assert action.step

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
-import msgspec
 import numpy as np
 
 from core.document import Document, MeshObject, mesh_to_edit, with_groom
@@ -38,6 +37,7 @@ from core.mesh.skin import Skin
 from core.posed import field_at, skin_at
 from core.record import Record
 from core.workspace import Respect
+from tools.action import AmountParams, NoParams, params_of
 from tools.respect import Edits, respected, restored
 
 
@@ -57,17 +57,6 @@ class Scene:
     def field(self) -> DistanceField:
         """What to collide with at rest (made at the first asking)."""
         return field_at(self.item, None, self.evaluator)
-
-
-class NoParams(Record):
-    """Of actions without settings."""
-
-
-class AmountParams(Record):
-    """Of actions that do more or less."""
-
-    amount: Annotated[float, field(
-        "Amount", "How much of it is done, from nothing at 0 to all at 1.", "", (0, 1), (0, 1))] = 1.0
 
 
 class LengthParams(Record):
@@ -134,10 +123,7 @@ class Action(NamedTuple):
 
     def make(self, params: dict[str, Any]) -> Record:
         """Its parameters from plain values; UserError naming the one that is not as it should be."""
-        try:
-            return msgspec.convert(params, self.Params)
-        except msgspec.ValidationError as error:
-            raise UserError(f"The settings of {self.label} cannot be used: {error}.") from error
+        return params_of(self.label, self.Params, params)
 
 
 def act(
