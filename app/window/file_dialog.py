@@ -74,13 +74,17 @@ class FileDialog(QFileDialog):
 
 
 class Icons(QAbstractFileIconProvider):
-    """Folders, places and files as our own icons."""
+    """Folders, places and files as our own icons, drawn once: the dialog asks for one for every file it lists."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._folder, self._file = icon("folder"), icon("file")
 
     def icon(self, what: QAbstractFileIconProvider.IconType | QFileInfo) -> QIcon:
         kinds = QAbstractFileIconProvider.IconType
         folder = what.isDir() if isinstance(what, QFileInfo) else what in (
             kinds.Folder, kinds.Desktop, kinds.Computer, kinds.Drive, kinds.Network)
-        return icon("folder" if folder else "file")
+        return self._folder if folder else self._file
 
 
 def _put_chevron(combo: QComboBox) -> None:

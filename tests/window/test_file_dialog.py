@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QFileInfo, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileSystemModel, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.window.file_dialog import FileDialog
+from app.window.file_dialog import FileDialog, Icons
 from app.window.opening import choose_file
 from app.window.theme import apply, load_theme
 
@@ -95,3 +95,11 @@ def test_it_keeps_to_the_lights_and_colours_of_the_theme(
         dialog.reject()
     finally:
         apply(app, load_theme("dark"), 12)
+
+
+def test_a_folder_of_many_files_costs_two_icons(qtbot: QtBot, folder: Path) -> None:
+    icons = Icons()
+    files, folders = [QFileInfo(str(path)) for path in folder.glob("*.usdc")], QFileInfo(str(folder / "sub"))
+    assert {icons.icon(file).cacheKey() for file in files} == {icons.icon(files[0]).cacheKey()}
+    assert icons.icon(folders).cacheKey() == icons.icon(Icons.IconType.Drive).cacheKey()
+    assert icons.icon(folders).cacheKey() != icons.icon(files[0]).cacheKey()
