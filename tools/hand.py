@@ -19,7 +19,7 @@ from core.overlay import Circle, Overlays
 from tools.craft import Craft
 from tools.pen import Pen, PenSettings
 from tools.ring import RingParams, ring_radius
-from tools.tool import Ground, Picks, Pointer, Sight, Stroke, Tool
+from tools.tool import Ground, NamesStep, Picks, Pointer, Sight, Stroke, Tool
 
 if TYPE_CHECKING:
     from tools.session import Session
@@ -125,7 +125,8 @@ class Hand:
         batches = tuple(self._batches)
         changed = document is not self.session.history.current
         self._drop()
-        self.session.commit(tool.step, document)
+        named = next((stroke.step for stroke, _ in strokes[:1] if isinstance(stroke, NamesStep)), None)
+        self.session.commit(named or tool.step, document)
         for stroke, _ in strokes[:1]:
             if isinstance(stroke, Picks) and stroke.picked:
                 self.session.remember(tool.name, stroke.picked)

@@ -135,6 +135,17 @@ class Picks(Protocol):
     picked: dict[str, Any]
 
 
+@runtime_checkable
+class NamesStep(Protocol):
+    """A stroke that may turn out to be something else than its tool says (a click that only picks a joint).
+
+    step : name of the undo step, looked at after the release; None for that of the tool.
+    """
+
+    @property
+    def step(self) -> str | None: ...
+
+
 class Turn(NamedTuple):
     """What held keys or the eraser end of the pen turn a tool into: another tool (or the same), some settings changed.
 

@@ -129,6 +129,32 @@ def test_a_click_picks_a_joint_and_poses_nothing():
     assert s.document.meshes[0].joint_selection == ("fore",)
 
 
+@pytest.mark.parametrize("tool", ["rotate", "move", "ik"])
+def test_a_click_that_picks_is_named_so_and_picking_the_same_again_is_no_step(tool):
+    s = posing(tool)
+    place = pixel(world(s)["hand"][:3, 3])
+    drag(s, [place])
+    assert s.history.names == ("New", "Select joints")
+    assert s.document.meshes[0].joint_selection == ("hand",)
+    before = s.document
+    drag(s, [place])
+    assert s.document is before
+    assert s.history.names == ("New", "Select joints")
+
+
+@pytest.mark.parametrize("tool", ["rotate", "move"])
+@pytest.mark.parametrize("pose", [None, turned("bent", fore=(0, 0, 50))])
+def test_a_handle_that_is_pressed_and_not_dragged_is_no_step(tool, pose):
+    s = posing(tool, "fore", pose=pose, axes="world", size=80.0)
+    x, y = pixel(world(s)["fore"][:3, 3])
+    way = around((x, y), 80.0, 0.6, 1.2) if tool == "rotate" else [(x + 60.0, y), (x + 90.0, y)]
+    before = s.document
+    drag(s, [way[0], way[0]])
+    assert s.document is before
+    drag(s, way)
+    assert s.history.names == ("New", "Rotate joints" if tool == "rotate" else "Move joints")
+
+
 def test_an_arrow_moves_along_its_axis_only_and_by_what_is_seen():
     s = posing("move", "hand", axes="world", size=80.0)
     before = world(s)

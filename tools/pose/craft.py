@@ -14,7 +14,7 @@ from core.document import Document, MeshObject, with_mesh
 from core.errors import UserError
 from core.groom.region import View
 from core.mesh.mesh import Mesh
-from core.pose.controls import rests
+from core.pose.controls import rests, without_noise
 from core.pose.edit_layers import refresh
 from core.pose.pose import Pose, moved_controls
 from core.pose.rig import Rig
@@ -23,10 +23,10 @@ from core.pose.sculpt.surface import SculptSurface, sculpt_surface
 from core.pose.sculpt.symmetry import Opposites, mirrored_ring, opposites_by_axis, opposites_by_topology
 from core.pose.skeleton import SkinWeights
 from core.pose.synthesis import pose_at
-from core.posed import skin_at
+from core.posed import held_points, skin_at
 from core.record import freeze
 from core.workspace import Respect
-from tools.pose_edits import add_sculpt, sculpt_name
+from tools.pose_edits import add_sculpt, same_pose, sculpt_name
 from tools.skin_ground import SkinGround
 from tools.tool import Hit, Sight, Tool
 
@@ -146,12 +146,12 @@ class PoseCraft:
     def document(self, document: Document, tool: Tool[Any], ground: PoseGround, matter: Any) -> Document:
         """The document with what the tool changed, sculpts in the layers of their poses."""
         before = self.matter(tool, ground)
-        if matter is before or (tool.edits == "posing" and matter == before):
+        if matter is before or (tool.edits == "posing" and _poses_nothing(ground, matter)):
             return document
         item = ground.item
         if tool.edits == "surface":
             pose = ground.pose.replace(name=sculpt_name(item.correctives, ground.pose))
-            return add_sculpt(document, item.id, pose, matter)
+            return add_sculpt(document, item.id, pose, matter if item.pose is not None else _at(ground, matter))
         if tool.edits == "mask" and item.mask is None and not matter.any():
             return document
         changed = self.shown(document, tool, ground, matter)
@@ -184,7 +184,7 @@ class PoseCraft:
 def _sides(session: Session, item: MeshObject, rig: Rig, sight: Sight, way: Way) -> tuple[PoseGround, ...]:
     workspace, evaluator = session.workspace, session.evaluator
     frame, respect = workspace.frame, workspace.respect
-    pose = item.pose if item.pose is not None else evaluator.get(pose_at, rig, frame=frame)
+    pose = item.pose if item.pose is not None else evaluator.get(_pose_of_clip, rig, frame=frame)
     opposites = evaluator.get(_opposites, item.mesh, way=way) if respect.symmetry else None
     return tuple(
         PoseGround(
@@ -195,6 +195,25 @@ def _sides(session: Session, item: MeshObject, rig: Rig, sight: Sight, way: Way)
         )
         for other in ((None,) if opposites is None else (None, opposites))
     )
+
+
+def _pose_of_clip(rig: Rig, frame: float) -> Pose:
+    return without_noise(rig, pose_at(rig, frame))
+
+
+def _poses_nothing(ground: PoseGround, matter: Posing) -> bool:
+    """True when a stroke neither selected anything nor left the joints elsewhere than they were."""
+    item = ground.item
+    return matter.selection == item.joint_selection and (
+        matter.pose is item.pose or (matter.pose is not None and same_pose(matter.pose, ground.pose)))
+
+
+def _at(ground: PoseGround, sculpted: Points) -> Points:
+    """What was sculpted on a frame of the clip at the pose of that frame: without its rounding and scaled joints."""
+    item, evaluator = ground.item, ground.evaluator
+    posed = held_points(item.mesh, ground.rig, item.correctives, ground.pose, evaluator=evaluator)
+    at_pose: Points = posed + (sculpted - ground.skin.points)
+    return at_pose
 
 
 def _opposites(mesh: Mesh, way: Way) -> Opposites:

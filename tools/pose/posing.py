@@ -115,6 +115,12 @@ class PosingStroke:
 
     def __init__(self, ground: PoseGround, selection: tuple[str, ...]) -> None:
         self.ground, self.selection = ground, selection
+        self.poses = False
+
+    @property
+    def step(self) -> str | None:
+        """A press that was no drag only selects."""
+        return None if self.poses else "Select joints"
 
     def posed(self, pointer: Pointer) -> Pose | None:
         """The pose of the drag as far as `pointer`; None where nothing is dragged."""
@@ -135,6 +141,7 @@ class PosingStroke:
                        or now.translations.get(n) != before.translations.get(n)]
             return matter._replace(pose=with_other_side(mirror_of_rig(rig), now, changed))
         pose = self.posed(pointers[-1])
+        self.poses = self.poses or pose is not None
         if pose is not None:
             pose = constrained(rig.skeleton, rig.constraints, pose)
         return Posing(matter.pose if pose is None else pose, self.selection)
