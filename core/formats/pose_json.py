@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.formats.mesh_file import READ_SUFFIXES, read_mesh
 from core.formats.text_numbers import text_bytes
-from core.pose.controls import rotation_dof, translation_dof
+from core.pose.controls import rests, rotation_dof, translation_dof
 from core.pose.layers import Sculpt
-from core.pose.pose import Pose
+from core.pose.pose import Pose, moved_controls
 from core.pose.pose_space import FALLOFFS, REST_NAME, Dof, Kernel
 from core.pose.rig import Control, Rig, clip_named, control_names, playing
 from core.pose.rotation import quaternion_from_euler
@@ -127,7 +127,7 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
     rig = _with_controls(said.controls, rig, path.name)
     dofs = _dofs(said.reads, rig, path.name)
     picked = {dof.control: dof for dof in dofs}
-    sculpts, notes = [], []
+    sculpts, notes, at_rest = [], [], rests(rig)
     for item in said.poses:
         where = f"{path.name}, pose {item.name!r}"
         if item.name == REST_NAME or not 0 < len(item.name) <= 255 or not item.name.isprintable():
@@ -139,8 +139,8 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
             each = tuple(reach) if isinstance(reach, list) else (reach,)
             if not each or not all(1e-6 <= one <= 1e6 for one in each):
                 raise UserError(f"{where}: the falloff of {control!r} must be above 0, not {reach}.")
-            if control not in {*pose.rotations, *pose.translations, *pose.numbers}:
-                notes.append(f"{where}: the falloff of {control!r} has no effect, for the pose does not set it.")
+            if control not in moved_controls(pose, at_rest):
+                notes.append(f"{where}: the falloff of {control!r} has no effect, for the pose leaves it at rest.")
                 continue
             turning = control in pose.rotations
             kind = picked[control].kind if control in picked else "swing-twist" if turning else "translation"

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.pose.controls import rests
-from core.pose.layers import UNMOVED, Extracted, LayerReport, anchors_of, diagonal, extract_layer, space_dofs
+from core.pose.layers import (
+    UNMOVED,
+    Extracted,
+    LayerReport,
+    anchors_of,
+    diagonal,
+    extract_layer,
+    sample_of,
+    space_dofs,
+)
 from core.pose.pose import Pose, moved_controls
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
@@ -80,7 +89,7 @@ def add_sculpt(
     kept = correctives
     if find_pose(correctives, pose.name) is not None:
         correctives = without_pose(correctives, pose.name)
-    sample = PoseSample(pose=pose, falloffs=dict(falloffs or {}))
+    sample = sample_of(pose, falloffs or {}, controls)
     layers = list(correctives.layers)
     at = next((i for i, layer in enumerate(layers) if layer.space.controls == controls), None)
     if at is None:

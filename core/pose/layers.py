@@ -91,7 +91,7 @@ def build(
         group = groups[controls]
         space = PoseSpace(
             dofs=space_dofs(rig, [s.pose for s in group], controls, dofs),
-            samples=tuple(PoseSample(pose=s.pose, falloffs=dict(s.falloffs)) for s in group), **options)
+            samples=tuple(sample_of(s.pose, s.falloffs, controls) for s in group), **options)
         space = space.replace(anchors=anchors_of(space, [s.pose for layer in layers for s in layer.space.samples]))
         targets = np.full((len(group), len(points), 3), np.nan)
         for k, sculpt in enumerate(group):
@@ -104,6 +104,11 @@ def build(
         reports.append(report)
         ready.append(prepare_layer(layer, rig))
     return Extracted(Correctives(layers=tuple(layers)), tuple(reports))
+
+
+def sample_of(pose: Pose, falloffs: Mapping[str, Falloff], controls: Sequence[str]) -> PoseSample:
+    """The sample of a pose in a space over `controls`; falloffs of others, which are at rest there, say nothing."""
+    return PoseSample(pose=pose, falloffs={name: reach for name, reach in falloffs.items() if name in controls})
 
 
 def space_dofs(

@@ -42,7 +42,8 @@ def read_points(path):
 
 
 POSES = [
-    {"name": "bent", "controls": {"elbow": {"rotate": [0, 0, 110]}}, "sculpt": "bent.obj", "falloff": {"elbow": 60}},
+    {"name": "bent", "controls": {"elbow": {"rotate": [0, 0, 110]}, "wrist": {"rotate": [0, 0, 0]}},
+     "sculpt": "bent.obj", "falloff": {"elbow": 60, "wrist": 40}},  # the second of which says nothing
     {"name": "twist", "controls": {"wrist": {"rotate": [120, 0, 0]}}, "sculpt": "twist.obj"},
     {"name": "plain", "controls": {"elbow": {"rotate": [0, 0, 60]}, "swell at 1": 0.5}, "sculpt": None},
 ]

@@ -325,3 +325,13 @@ def test_a_layer_names_a_vertex_once(apart):
     vertices[7] = vertices[400]
     with pytest.raises(ValueError, match="different"):
         layer.replace(vertices=freeze(vertices.copy()))
+
+
+def test_a_falloff_of_a_control_that_rests_says_nothing():
+    rig, points = arm()
+    pose = turned("bent", {"flex": 0.0, "mood": 0.25}, fore=(0, 0, 90))
+    target = bumped(rig, points, pose, 0)
+    falloffs = {"fore": (1.0,), "hand": (0.5,), "flex": (0.2,), "mood": (0.1,)}
+    made = build(points, rig, [Sculpt(pose, target, falloffs)]).correctives
+    again = add_sculpt(points, rig, Correctives(), pose, target, falloffs).correctives
+    assert [c.layers[0].space.samples[0].falloffs for c in (made, again)] == [{"fore": (1.0,)}] * 2
