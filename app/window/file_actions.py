@@ -79,6 +79,13 @@ class FileActions:
         menu = RecentMenu(self._desk, self._window.settings.recent, self._window.opening.open, top)
         menu.popup(top.mapToGlobal(top.rect().bottomLeft()))
 
+    def import_sculpt(self, path: Path | None = None) -> None:
+        """Take the sculpt of another program's file for the pose that is shown."""
+        if path is None:
+            self._choose("Import a sculpt", [filter_of("Meshes", MESH_SUFFIXES)], self.import_sculpt)
+            return
+        self._desk.session.act("import_sculpt", file=str(path))
+
     def reload_mesh(self, path: Path | None = None, mesh_id: int | None = None) -> None:
         """Put another shape in place of a mesh, the active one unless it is named; its hair comes along."""
         document = self._desk.session.history.current

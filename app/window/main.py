@@ -206,7 +206,7 @@ class MainWindow(QMainWindow):
             files.save_screenshot, files.save_macro, files.play_macro)
         self.choose_background, self.pin_reference = files.choose_background, files.pin_reference
         self.restart_safe, self.import_mesh = files.restart_safe, opening.ask_import
-        self.camera_from_file = files.camera_from_file
+        self.camera_from_file, self.import_sculpt = files.camera_from_file, files.import_sculpt
 
     def make_session(self, document: Document | None = None, *args: Any, **settings: Any) -> Session:
         """A session for this window: with a journal, so that a crash loses nothing, and with its tools."""

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from app.window.commands import Command, Window
 from core.falloff import SHAPES
 from tools.groom.actions import ACTIONS, Action
+from tools.pose.actions import ACTIONS as POSE_ACTIONS
+from tools.pose.actions import PoseAction
 from tools.registry import Registry
 from tools.tool import Tool
 
@@ -90,10 +92,32 @@ def action_command(action: Action) -> Command:
     """The command that does an action to the groom with its usual settings."""
     return Command(
         f"groom.{action.name}", action.label, action.tooltip, _act(action.name), "tools.session.Session.act",
-        "document", action.step, _needs_guides, icon=action.icon, scope="viewport", words="action guides hair")
+        "document", action.step, _needs_guides, icon=action.icon, scope="groom", words="action guides hair")
 
 
-ACTION_COMMANDS: tuple[Command, ...] = tuple(action_command(action) for action in ACTIONS.values())
+def _needs_rig(desk: Desk) -> str | None:
+    return None if desk.posed is not None else "There is no rig yet: open a mesh with a skeleton or blend shapes first."
+
+
+def _act_or_ask(action: PoseAction) -> Callable[[Window], object]:
+    if action.asks == "file":
+        return lambda window: window.import_sculpt()
+    return _act(action.name)
+
+
+def pose_action_command(action: PoseAction) -> Command:
+    """The command that does an action to the mesh with a rig, with its usual settings; a file it asks for."""
+    dots = "" if action.asks is None else "\N{HORIZONTAL ELLIPSIS}"
+    return Command(
+        f"pose.{action.name}", f"{action.label}{dots}", action.tooltip, _act_or_ask(action),
+        f"{action.edit.__module__}.{action.edit.__name__}", "document", action.step, _needs_rig, icon=action.icon,
+        scope="pose", words="action rig pose")
+
+
+ACTION_COMMANDS: tuple[Command, ...] = (
+    *(action_command(action) for action in ACTIONS.values()),
+    *(pose_action_command(action) for action in POSE_ACTIONS.values()),
+)
 
 HAND: tuple[Command, ...] = (
     Command(

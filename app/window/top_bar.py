@@ -18,7 +18,7 @@ from app.window.theme import look_of, text_font
 LITTLE = 5.0  # seconds between two words about the autosave
 LOOK_AGAIN = 400  # ms after a change, when the autosave has had its time
 ABOUT = {
-    "File": "file", "Edit": "edit", "View": "view", "Tools": "tool", "Groom": "groom", "Time": "frame",
+    "File": "file", "Edit": "edit", "View": "view", "Tools": "tool", "Groom": "groom", "Pose": "pose", "Time": "frame",
     "Curves": "curves", "Window": "window",
 }
 
