@@ -15,6 +15,7 @@ from core.history import History
 from core.leaves import same_bits
 from core.workspace import Respect, Workspace
 from tests.tools.scenes import BENT, guides_of, pointers, session, sight
+from tests.tools.some_params import some_params
 from tools.groom.actions import ACTIONS
 from tools.pose.actions import ACTIONS as POSE_ACTIONS
 from tools.registry import Registry
@@ -151,26 +152,6 @@ STROKES = st.tuples(
     st.sampled_from(sorted(GROOM)), st.integers(0, 2**31 - 1), st.sampled_from([1001.0, 1004.0, BENT]),
     st.booleans(), st.booleans(), st.booleans(),
 )
-
-
-def some_params(rng, kind):
-    """Any settings within the soft ranges."""
-    out = {}
-    for name, known in fields_of(kind.Params).items():
-        value = getattr(kind.Params(), name)
-        if rng.random() < 0.5:
-            continue
-        if isinstance(value, bool):
-            out[name] = bool(rng.integers(2))
-        elif known.choices:
-            out[name] = str(rng.choice(known.choices))
-        elif isinstance(value, int):
-            out[name] = int(rng.integers(max(known.soft[0], known.hard[0]), min(known.soft[1], 60)))
-        elif isinstance(value, float):
-            out[name] = float(rng.uniform(*known.soft))
-        else:
-            out[name] = "half"
-    return out
 
 
 def some_stroke(s, stroke):

@@ -2,24 +2,17 @@
 
 import inspect
 import itertools
-import shutil
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import HealthCheck, note, settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from hypothesis.stateful import rule
 
 import core.document
 from core.document import Document, MeshObject, find_groom, free_id, with_groom, with_mesh, without_groom, without_mesh
-from core.errors import UserError
 from core.evaluator import Evaluator
-from core.formats.journal import SUFFIXES, Journal
-from core.formats.project import read_project
-from core.formats.recovery import recover_files
 from core.groom.commands import COMMANDS, skin_context
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
@@ -29,7 +22,7 @@ from core.leaves import same_bits
 from core.mesh.mesh import Mesh
 from core.mesh.roots import Roots
 from core.value import constant, formula
-from tools.session import Session
+from tests.tools.undo_machine import UndoMachine
 
 SEEDS = st.integers(0, 2**31 - 1)
 
@@ -146,91 +139,23 @@ def test_a_command_is_undone_from_packed_steps(name):
     history.close()
 
 
-class Commands(RuleBasedStateMachine):
-    """A session against a plain list of states."""
+class Commands(UndoMachine):
+    """Kernels and functions of the document."""
 
-    @initialize()
-    def start(self):
-        self.folder = Path(tempfile.mkdtemp(prefix="filoplume-test-"))
-        self.journal = Journal(self.folder, patience=5.0)
-        self.session = Session(START, journal=self.journal, evaluator=Evaluator())
-        self.session.history._keep = 2
-        self.states, self.cursor = [START], 0
-
-    def _edited(self, name, function, *args):
-        before = self.session.document
-        try:
-            self.session.edit(name, function, *args)
-        except UserError as refusal:  # a command may have nothing to do here, and says so
-            note(str(refusal))
-            assert self.session.document is before
-        if self.session.document is not before:
-            self.cursor += 1
-            self.states[self.cursor :] = [self.session.document]
+    first = START
 
     @rule(name=st.sampled_from(sorted(COMMANDS)), seed=SEEDS, data=st.data())
     def kernel(self, name, seed, data):
         groom = _some_groom(self.session.document, data.draw)
-        self._edited(COMMANDS[name].label, kernel, groom.id, name, seed)
+        self.done(self.session.edit, COMMANDS[name].label, kernel, groom.id, name, seed)
 
     @rule(name=st.sampled_from(sorted(DOCUMENT_COMMANDS)), data=st.data())
     def document_command(self, name, data):
-        self._edited(name, DOCUMENT_COMMANDS[name], data.draw)
+        self.done(self.session.edit, name, DOCUMENT_COMMANDS[name], data.draw)
 
     @rule(name=st.sampled_from(sorted(COMMANDS)), seed=SEEDS)
     def preview_and_cancel(self, name, seed):
-        before = self.session.document
-        try:
-            self.session.preview(kernel(before, before.grooms[0].id, name, seed))
-        except UserError as refusal:
-            note(str(refusal))
-        self.session.cancel()
-        assert self.session.document is before
-
-    @rule()
-    def undo(self):
-        self.cursor = max(0, self.cursor - 1)
-        self.session.undo()
-
-    @rule()
-    def redo(self):
-        self.cursor = min(len(self.states) - 1, self.cursor + 1)
-        self.session.redo()
-
-    @rule(data=st.data())
-    def jump(self, data):
-        self.cursor = data.draw(st.integers(0, len(self.states) - 1))
-        self.session.jump(self.cursor)
-
-    @rule()
-    def save_and_open(self):
-        self.session.save(self.folder / "a.filo")
-        assert same_bits(read_project(self.folder / "a.filo").document, self.session.document)
-
-    @rule()
-    def replay_the_journal(self):
-        if self.journal.flush():
-            assert self.journal.error is None
-            files = [self.folder / (self.journal.token + suffix) for suffix in SUFFIXES]
-            assert same_bits(recover_files(files).document, self.session.document)
-
-    @invariant()
-    def agrees(self):
-        if hasattr(self, "session"):
-            assert self.session.document is self.session.history.current
-            assert same_bits(self.session.document, self.states[self.cursor])
-
-    def teardown(self):
-        if hasattr(self, "session"):
-            self.session.history.flush()
-            while self.session.history.cursor:
-                self.session.undo()
-            assert same_bits(self.session.document, START)
-            while self.session.history.redo_name is not None:
-                self.session.redo()
-            assert same_bits(self.session.document, self.states[-1])
-            self.session.close(discard=True)
-            shutil.rmtree(self.folder)
+        self.shown_and_cancelled(kernel, self.session.document.grooms[0].id, name, seed)
 
 
 TestCommands = Commands.TestCase
