@@ -47,6 +47,8 @@ class ViewOptions(Record):
     """How the viewport shows the document.
 
     shading : of meshes, one of SHADINGS. map : name of the map shown as colours on the skin, or None.
+    heat : what of the posed mesh is shown as colours, one of ``core.pose.heat.VIEWS``, or "" for none. compare : the
+    methods of ``core.pose.compare`` shown side by side, none for the usual single view.
     isolated : ids of the only meshes shown (with their grooms), empty for all; ghosted : ids shown translucent.
     background : path of an image behind everything, or None.
     gate : of a film camera, or None. safe_areas : whether it shows where action and titles are safe.
@@ -60,6 +62,8 @@ class ViewOptions(Record):
     axes: bool = True
     hud: bool = True
     map: str | None = None
+    heat: str = ""
+    compare: tuple[str, ...] = ()
     isolated: tuple[int, ...] = ()
     ghosted: tuple[int, ...] = ()
     background: str | None = None

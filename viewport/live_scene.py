@@ -328,7 +328,7 @@ class LiveScene:
             wire = options.wire or options.shading == "wire"
             surfaces.append(Surface(
                 posed.points, posed.normals, skin_at_rest(item.mesh, self._evaluator).triangles.vertices,
-                skin_of(looks[item.id]) if item.id in looks else SKIN, self._map_values(item),
+                skin_of(looks[item.id]) if item.id in looks else SKIN, self._map_values(item), "map",
                 item.id in options.ghosted, self._evaluator.get(edge_vertices, item.mesh) if wire else None,
                 item.id in looks,
             ))

@@ -6,7 +6,7 @@ primaries. Points are in world space, metres.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,8 @@ from scipy.spatial import cKDTree
 Color = tuple[float, float, float]
 MOST_BOUNDING, ALONG = 5_000, 5  # strands, and points of each, looked at to find how large the scene is
 Floats = NDArray[np.float32]
+Ramp = Literal["map", "heat", "signed"]
+RAMPS: tuple[Ramp, ...] = get_args(Ramp)
 
 
 class Surface(NamedTuple):
@@ -23,6 +25,8 @@ class Surface(NamedTuple):
     points : (V, 3) float32. normals : (V, 3) float32, unit. triangles : (T, 3) int32.
     color : linear RGB of the skin; under a coat take :func:`skin_under`.
     values : (V,) float32 or None, a map to be shown as colours, 0 .. 1.
+    ramp : the colours: "map" flat, so that they can be compared; "heat" the same ones in light, so that the form is
+        seen; "signed" in light, 0.5 stands for nothing.
     ghost : drawn translucent, over what is behind it.
     edges : (E, 2) int32 or None, the lines of a wire picture: the edges of the polygons, without the diagonals that
         triangulation added. Without them all edges of the triangles are drawn.
@@ -34,6 +38,7 @@ class Surface(NamedTuple):
     triangles: np.ndarray
     color: Color = (0.36, 0.35, 0.34)
     values: np.ndarray | None = None
+    ramp: Ramp = "map"
     ghost: bool = False
     edges: np.ndarray | None = None
     covered: bool | None = None

@@ -264,6 +264,11 @@ class View3D:
             for number, (line, tone) in enumerate(lines)
         ]
 
+    @property
+    def picture(self) -> moderngl.Framebuffer:
+        """The best picture there is of what is shown, displayed colours alone; one must have been drawn."""
+        return self._targets[0].alone
+
     # what is kept
 
     def _light_key(self) -> tuple[tuple[Any, ...], NDArray[np.float64]]:

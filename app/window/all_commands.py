@@ -6,6 +6,7 @@ from app.window.commands import Command
 from app.window.curve_commands import CURVES
 from app.window.file_commands import EDIT, FILE, MACRO
 from app.window.plugin_bar import trouble_commands
+from app.window.pose_look import POSE_LOOK
 from app.window.scene_commands import SCENE
 from app.window.tool_commands import ACTION_COMMANDS, HAND, tool_commands
 from app.window.view_commands import FRAME, VIEW
@@ -16,6 +17,6 @@ from tools.registry import Registry
 def all_commands(registry: Registry) -> tuple[Command, ...]:
     """Every command there is, in the order of the menus; those of the tools come from `registry`."""
     return (
-        *FILE, *EDIT, *SCENE, *VIEW, *FRAME, *CURVES, *tool_commands(registry), *HAND, *ACTION_COMMANDS, *MACRO,
-        *WINDOW, *trouble_commands(registry),
+        *FILE, *EDIT, *SCENE, *VIEW, *POSE_LOOK, *FRAME, *CURVES, *tool_commands(registry), *HAND, *ACTION_COMMANDS,
+        *MACRO, *WINDOW, *trouble_commands(registry),
     )

@@ -19,6 +19,7 @@ from tools.session import Session
 from viewport.density import DensityController
 from viewport.hud import TextImage
 from viewport.live_scene import Change, Done, Job, LiveScene
+from viewport.panes import Pane, Panes
 from viewport.scene import Scene
 from viewport.view import HudLine, View3D
 
@@ -38,8 +39,11 @@ class LivePicture:
     def __init__(
         self, ctx: moderngl.Context, session: Session, text: TextImage, start_job: StartJob,
         adopted: Callable[[], None], budget_ms: float,
+        dress: Callable[[Scene], tuple[Pane, ...]] = lambda scene: (Pane(scene),),
     ) -> None:
         self.view = View3D(ctx, text=text)
+        self.panes = Panes(self.view)
+        self.dress = dress
         self.density = DensityController(budget_ms=budget_ms)
         self.shown = self.total = 0
         self.troubles: tuple[str, ...] = ()
@@ -84,14 +88,15 @@ class LivePicture:
 
     def draw(self) -> None:
         """Draw the moving picture."""
-        self.shown = self.view.draw_interactive(self.density.drawn)
+        self.shown = self.panes.draw_interactive(self.density.drawn)
         self._refining, self._finished = None, False
 
     def present(
-        self, framebuffer: moderngl.Framebuffer, overlays: Sequence[Overlay], hud: Sequence[HudLine], ratio: float
+        self, framebuffer: moderngl.Framebuffer, whole: tuple[int, int], overlays: Sequence[Overlay],
+        hud: Sequence[HudLine], ratio: float,
     ) -> None:
-        """Bring the best picture there is, with marks and words over it, to the screen."""
-        self.view.present(framebuffer, self._size, overlays, hud, ratio)
+        """Bring the best picture there is, with marks and words over it, to a screen of `whole` pixels."""
+        self.panes.present(framebuffer, whole, overlays, hud, ratio)
 
     def rest(self, camera: Camera) -> bool:
         """One short slice of what is still to be done; False when there is nothing more."""
@@ -104,7 +109,7 @@ class LivePicture:
             return False
         self._ask()
         if self._refining is None:
-            self._refining = self.view.refine()
+            self._refining = self.panes.refine()
         if next(self._refining, None) is None:
             self._refining, self._finished = None, True
         return not self._finished
@@ -115,18 +120,20 @@ class LivePicture:
         options = shown_options(session).replace(hud=False, axes=False)
         change = self.live.update(session.document, frame, options, True, None, session.workspace.groom)
         self._size, self._options = size, options
-        self._take(change, camera)
+        self._take(change, camera, single=True)
         yield from self.view.refine()
 
     def release(self) -> None:
         """Give everything on the graphics card back."""
+        self.panes.release()
         self.view.release()
 
-    def _take(self, change: Change, camera: Camera) -> bool:
+    def _take(self, change: Change, camera: Camera, single: bool = False) -> bool:
         self._scene, self.troubles = change.scene, change.troubles
         self.total = sum(len(c.ids if c.order is None else c.order) for c in change.scene.coats)
         self.density.limit(max((len(c.ids if c.order is None else c.order) for c in change.scene.coats), default=0))
-        changed = self.view.begin(change.scene, camera, self._size, self._options)
+        panes = (Pane(change.scene),) if single else self.dress(change.scene)
+        changed = self.panes.begin(panes, camera, self._size, self._options)
         for points, rows in change.rows:
             self.view.rows_changed(points, rows)
         if changed or change.rows:

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 from app.window.choice_bar import ChoiceBar
 from app.window.desk import Desk
 from app.window.pose_graph import Graph, Line
+from app.window.pose_look import PoseLook
 from app.window.pose_map_panel import PoseMap
 from app.window.sections import Row
 from app.window.theme import look_of
@@ -31,12 +32,13 @@ _TO = Field("To", "Where the way ends: the surface point this sculpt moves most 
 
 
 class PoseSide(QWidget):
-    """The map over the graph."""
+    """What the view shows, the map, and the graph."""
 
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.desk = desk
         self.setMinimumWidth(200)
+        self.look = PoseLook(desk)
         self.map = PoseMap(desk)
         self.graph = Graph()
         self.kind = ChoiceBar(_GRAPH, CLIP, CLIP, (CLIP, WALK), ("weights over the clip", "walk to a pose"))
@@ -58,7 +60,9 @@ class PoseSide(QWidget):
         self.parts.setStretchFactor(1, 1)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(self.parts)
+        whole.setSpacing(0)
+        whole.addWidget(self.look)
+        whole.addWidget(self.parts, 1)
         self._seen: tuple[object, ...] = ()
         for bar in (self.kind, self.start, self.end):
             bar.edited.connect(lambda value, final: self.refresh())

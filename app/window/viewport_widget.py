@@ -40,6 +40,7 @@ from app.window.hotkeys import Hotkeys
 from app.window.live_picture import LivePicture, Stopwatch
 from app.window.navigation import CameraDrag, Eye
 from app.window.pose_overlay import skeleton_of
+from app.window.pose_views import PoseViews
 from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
 from app.window.theme import look_of, text_font
 from core.document import Document
@@ -51,6 +52,7 @@ from tools.tool import Pointer, Sight
 from viewport.gate import gate_marks
 from viewport.hud import Byte3
 from viewport.live_scene import Done, Job
+from viewport.panes import corner_of, pane_at, size_of
 from viewport.view import HudLine
 
 NO_GL = "The view needs OpenGL 3.3, and this computer offers {found}. Install or update its graphics driver."
@@ -76,6 +78,9 @@ class Viewport(QOpenGLWindow):
         self.setFormat(surface_format())
         self.desk = desk
         self.playing = False
+        self.views = PoseViews(desk)
+        self.views.fresh.connect(self.redraw)
+        self._pane = 0  # the one the pointer is in
         self.eye = Eye(desk, self.pixels, self.devicePixelRatio, self.redraw)
         self.gestures = Gestures(desk, self.eye, hotkeys, commands, window)
         self.gestures.pictures.shape = self._shape_of
@@ -105,9 +110,22 @@ class Viewport(QOpenGLWindow):
     # -- what is shown -----------------------------------------------------------------------------------
 
     def pixels(self) -> tuple[int, int]:
-        """Width and height of the picture in pixels of the framebuffer."""
+        """Width and height of the picture, of one pane where there are several, in pixels of the framebuffer."""
+        return size_of(max(len(self.views.methods), 1), self._whole())
+
+    def _whole(self) -> tuple[int, int]:
         ratio = self.devicePixelRatio()
         return max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
+
+    def _in_pane(self, pointer: Pointer) -> Pointer:
+        """A pointer in pixels of its pane; what goes on stays in the pane it began in."""
+        count = len(self.views.methods)
+        if count < 2:
+            return pointer
+        if self.gestures.drag is None:
+            self._pane = pane_at(pointer.x, pointer.y, count, self._whole())
+        x, y = corner_of(self._pane, count, self._whole())
+        return pointer._replace(x=pointer.x - x, y=pointer.y - y)
 
     def repaint_soon(self) -> None:
         """Paint once more, what is drawn or what lies over it."""
@@ -201,7 +219,8 @@ class Viewport(QOpenGLWindow):
         self._screen = self._ctx.detect_framebuffer(0)
         try:
             self.picture = LivePicture(
-                self._ctx, self.desk.session, letters, self._start_job, self.redraw, self._budget_ms)
+                self._ctx, self.desk.session, letters, self._start_job, self.redraw, self._budget_ms,
+                self.views.panes)
         except Exception as error:  # a driver that promises 3.3 and fails at the first shader
             self.failed.emit(NO_GL.format(found=_version(self.context(), error)))
 
@@ -219,7 +238,8 @@ class Viewport(QOpenGLWindow):
             if picture.follow(self.eye.camera, self.pixels(), moving) or picture.shown < 0:
                 picture.draw()
                 self._moved = True
-        picture.present(self._screen, self._overlays(), self._hud_lines(), self.devicePixelRatio())
+        picture.present(
+            self._screen, self._whole(), self._overlays(), self._hud_lines(), self.devicePixelRatio())
 
     def resizeGL(self, width: int, height: int) -> None:
         """Another size is another picture."""
@@ -371,7 +391,7 @@ class Viewport(QOpenGLWindow):
         button = BUTTON_NAMES.get(event.button())
         self.requestActivate()
         if button is not None and not self._pen:
-            self._press(button, event.modifiers(), mouse_pointer(event, self.devicePixelRatio()),
+            self._press(button, event.modifiers(), self._in_pane(mouse_pointer(event, self.devicePixelRatio())),
                         event.globalPosition().toPoint())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
@@ -383,7 +403,7 @@ class Viewport(QOpenGLWindow):
         if not self._pen:
             if event.buttons() == Qt.MouseButton.NoButton:
                 self.gestures.all_up()
-            self._move(mouse_pointer(event, self.devicePixelRatio()), event.globalPosition().toPoint())
+            self._move(self._in_pane(mouse_pointer(event, self.devicePixelRatio())), event.globalPosition().toPoint())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """A button goes up."""
@@ -394,7 +414,7 @@ class Viewport(QOpenGLWindow):
     def tabletEvent(self, event: QTabletEvent) -> None:
         """A pen: accepted whatever it says, so that the system makes no mouse of it."""
         event.accept()
-        pointer = pen_pointer(event, self.devicePixelRatio())
+        pointer = self._in_pane(pen_pointer(event, self.devicePixelRatio()))
         place, button = event.globalPosition().toPoint(), BUTTON_NAMES.get(event.button(), "LMB")
         if event.type() == QEvent.Type.TabletPress:
             self._pen = True
@@ -409,7 +429,7 @@ class Viewport(QOpenGLWindow):
     def wheelEvent(self, event: QWheelEvent) -> None:
         """The wheel, or two fingers."""
         notches = event.angleDelta().y() / 120.0 or event.angleDelta().x() / 120.0  # Alt turns the wheel sideways
-        place = place_pointer(event.position(), self.devicePixelRatio(), event.modifiers())
+        place = self._in_pane(place_pointer(event.position(), self.devicePixelRatio(), event.modifiers()))
         if notches:
             self.gestures.wheel(notches, modifier_names(event.modifiers()), place)
         event.accept()
@@ -418,8 +438,8 @@ class Viewport(QOpenGLWindow):
         """A key that is no hotkey."""
         if event.isAutoRepeat() and not isinstance(self.gestures.drag, BrushDrag):
             return
-        pointer = self._pointer or place_pointer(
-            QPointF(self.mapFromGlobal(QCursor.pos())), self.devicePixelRatio(), event.modifiers())
+        pointer = self._pointer or self._in_pane(place_pointer(
+            QPointF(self.mapFromGlobal(QCursor.pos())), self.devicePixelRatio(), event.modifiers()))
         if not self.gestures.key(
             Qt.Key(event.key()), event.text(), modifier_names(event.modifiers()), pointer, QCursor.pos()
         ):
@@ -490,7 +510,7 @@ class Viewport(QOpenGLWindow):
     def _pinch(self, event: QNativeGestureEvent) -> bool:
         if event.gestureType() != Qt.NativeGestureType.ZoomNativeGesture or self.gestures.drag is not None:
             return False
-        place = place_pointer(event.position(), self.devicePixelRatio(), event.modifiers())
+        place = self._in_pane(place_pointer(event.position(), self.devicePixelRatio(), event.modifiers()))
         self.eye.pinch(place.x, place.y, 1.0 / max(1.0 + event.value(), 0.1))
         return True
 

@@ -5,7 +5,8 @@ uniform float covered;   // 1 under a coat, where little light of the sky arrive
 uniform bool stands_for_hair;   // of a moving picture, under a sparse coat: as the coat looks between its hairs
 uniform int manner;      // 0 in light, 1 clay (lit by the view alone), 2 flat
 uniform bool show_map;
-uniform sampler2D ramp;
+uniform sampler2D ramp;   // rows of colours: of a flat map, and in light of values and of signed ones
+uniform int ramp_row;
 uniform float opacity;   // 1, or of a ghost: more at its edges
 uniform vec3 view_right, view_up;
 
@@ -40,8 +41,11 @@ vec4 skin(vec3 position, vec3 n, vec3 v, float value)
     float toward = clamp(abs(dot(n, v)), 0.0, 1.0);
     float alpha = opacity < 1.0 ? mix(0.55, opacity, sqrt(toward)) : 1.0;
     vec3 light;
-    if (show_map) light = textureLod(ramp, vec2((clamp(value, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5), 0.0).rgb
-        * (0.62 + 0.38 * toward);
+    if (show_map) {
+        vec2 place = vec2((clamp(value, 0.0, 1.0) * 255.0 + 0.5) / 256.0, (float(ramp_row) + 0.5) / 3.0);
+        light = textureLod(ramp, place, 0.0).rgb;
+        light = ramp_row > 0 ? clay(n, v, light) : light * (0.62 + 0.38 * toward);
+    }
     else if (manner == 2) light = surface_color;
     else if (manner == 1) light = clay(n, v, surface_color);
     else light = in_light(position, n, v, surface_color);

@@ -12,13 +12,18 @@ from PySide6.QtWidgets import QWidget
 
 from app.window.pose_controls import PoseControls
 from app.window.pose_list import PoseLibrary, PoseList
+from app.window.pose_overlay import skeleton_of
 from core.demo.pose_document import pose_document
 from core.document import Document
+from core.overlay import Circle
+from core.pose.compare import LABELS
 from core.pose.pose import REST
 from core.pose.rotation import quaternion_from_euler
+from core.pose.synthesis import evaluate
 from core.posed import shown_points
 from tests.window.conftest import Opened
 from tests.window.hand import Hand
+from tools.pose_edits import hold_pose
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -172,3 +177,63 @@ def test_map_and_model_stand_over_one_another_in_a_narrow_window(posing: Hand) -
     posing.rest()
     assert window.sides.orientation() == Qt.Orientation.Vertical
     assert window.viewport.width() > 300
+
+
+def test_colours_of_the_surface_follow_the_pose_and_say_what_they_mean(posing: Hand) -> None:
+    window = posing.window
+    desk, picture = window.desk, window.viewport.picture
+    window.pose_side.look.heat.enter("shape")
+    assert desk.workspace.view.heat == "shape"
+    at_rest = picture_values(posing)
+    assert np.ptp(at_rest) == pytest.approx(0.0, abs=1e-6)
+    desk.edit("Pose", hold_pose, desk.posed.id, desk.posed.correctives.layers[0].space.samples[0].pose)
+    posing.rest()
+    assert np.ptp(picture_values(posing)) > 0.2
+    legend = picture.panes.shown[0].legend
+    assert legend.signed
+    assert legend.ticks[2].endswith("m")
+    window.commands.run("view.heat_error")
+    posing.rest()
+    assert picture.panes.shown[0].legend.title.startswith("Error")
+    window.commands.run("view.heat_plain")
+    posing.rest()
+    assert picture.panes.shown[0].scene.surfaces[0].values is None
+    desk.choose("mask")
+    posing.rest()
+    assert picture.panes.shown[0].legend.title == "Mask"
+
+
+def test_methods_stand_side_by_side_and_the_hand_works_in_any_of_them(posing: Hand) -> None:
+    window = posing.window
+    desk, view = window.desk, window.viewport
+    whole = view.pixels()
+    desk.edit("Pose", hold_pose, desk.posed.id, desk.posed.correctives.layers[0].space.samples[0].pose)
+    window.pose_side.look.sides.enter("SSD · SI · PSD · WPSD")
+    posing.rest()
+    panes = view.picture.panes.shown
+    assert [pane.name for pane in panes] == [LABELS[m] for m in ("skin", "interpolation", "pose-space", "weighted")]
+    skin, _, psd, _ = (pane.scene.surfaces[0].points for pane in panes)
+    item = desk.posed
+    assert np.array_equal(skin, evaluate(item.mesh.points, item.rig, None, item.pose))
+    assert psd == pytest.approx(evaluate(item.mesh.points, item.rig, item.correctives, item.pose), abs=1e-6)
+    size = view.pixels()
+    assert size == (whole[0] // 2, whole[1] // 2)
+    desk.choose("rotate")
+    names = item.rig.skeleton.names
+    rings = [m for m in skeleton_of(desk, view.eye.camera, size, 1.0) if isinstance(m, Circle)]
+    ring = rings[names.index("elbow")]
+    place = (ring.x + size[0] + 0.5) / whole[0], (ring.y + size[1] + 0.5) / whole[1]  # in the last pane
+    posing.press(place)
+    posing.release(place)
+    posing.rest()
+    assert desk.posed.joint_selection == ("elbow",)
+    window.commands.run("view.single")
+    posing.rest()
+    assert view.pixels() == whole
+
+
+def picture_values(hand: Hand) -> np.ndarray:
+    hand.rest()
+    values = hand.window.viewport.picture.panes.shown[0].scene.surfaces[0].values
+    assert values is not None
+    return values

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from viewport.scene import Color, Surface
+from viewport.scene import RAMPS, Color, Surface
 from viewport.shaders import program, set_uniforms
 
 RAMP_UNIT = 7
@@ -26,7 +26,8 @@ class MeshPrograms:
         self.quick = program(ctx, (*skin, "mesh_quick.vert"), ("mesh_quick.frag",))
         self.depth = program(ctx, ("mesh_depth.vert",), ("depth_only.frag",))
         self.edges = program(ctx, ("mesh_edges.vert",), ("display.glsl", "mesh_edges.frag"))
-        self.ramp = ctx.texture((256, 1), 4, dtype="f4", data=map_colors().tobytes())
+        rows = np.stack([map_colors(), map_colors(), signed_colors()])  # as scene.RAMPS
+        self.ramp = ctx.texture((256, len(rows)), 4, dtype="f4", data=rows.tobytes())
         self.ramp.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.ramp.repeat_x = False
 
@@ -38,7 +39,17 @@ class MeshPrograms:
 
 def map_colors() -> NDArray[np.float32]:
     """(256, 4) float32: linear RGB of a map's values from 0 to 1, and 1. Viridis: even steps look like even steps."""
-    steps = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1] / 255.0
+    return _linear(cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1] / 255.0)
+
+
+def signed_colors() -> NDArray[np.float32]:
+    """As :func:`map_colors`, of values about 0.5: blue below, grey where there is nothing, orange above."""
+    stops = np.array([[30, 80, 190], [110, 165, 230], [176, 176, 178], [238, 160, 80], [190, 50, 20]]) / 255.0
+    at = np.linspace(0.0, len(stops) - 1.0, 256)
+    return _linear(np.stack([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)], axis=1))
+
+
+def _linear(steps: NDArray[np.float64]) -> NDArray[np.float32]:
     out = np.ones((256, 4), np.float32)
     out[:, :3] = np.where(steps <= 0.04045, steps / 12.92, ((steps + 0.055) / 1.055) ** 2.4)
     return out
@@ -108,6 +119,7 @@ class MeshDrawable:
             set_uniforms(vertices.program, {
                 "manner": 0, "opacity": 1.0, **uniforms, "surface_color": color or self.surface.color,
                 "ramp": RAMP_UNIT, "show_map": self.surface.values is not None,
+                "ramp_row": RAMPS.index(self.surface.ramp),
             })
             vertices.render(moderngl.TRIANGLES, vertices=3 * len(self.surface.triangles))
 

@@ -1,0 +1,252 @@
+"""What the view shows of a rig: a field as colours on the posed mesh, and the methods side by side.
+
+Computed as the picture is drawn where that is quick; else on a worker, and what was there before stays until it comes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from PySide6.QtCore import QObject, Signal
+
+from app.window.desk import Desk
+from core.document import MeshObject
+from core.errors import UserError
+from core.evaluator import Evaluator
+from core.mesh.edges import edge_vertices
+from core.mesh.mesh import Mesh
+from core.mesh.normals import mesh_normals
+from core.mesh.skin import skin_at_rest
+from core.pose.compare import LABELS, METHODS, Method, compared
+from core.pose.heat import (
+    VIEWS,
+    Heat,
+    Points,
+    View,
+    condition_heat,
+    delta_heat,
+    error_heat,
+    mask_heat,
+    shape_heat,
+    strain_heat,
+    weight_heat,
+)
+from core.pose.pose import Pose
+from core.pose.pose_space import Correctives
+from core.pose.rig import Rig
+from core.pose.synthesis import pose_at, prepare
+from core.posed import shown_points
+from core.record import freeze
+from viewport.legend import Legend
+from viewport.panes import Pane
+from viewport.scene import Scene, Surface
+
+Result = TypeVar("Result")
+MANY = 20_000  # vertices: fields of larger meshes are computed on a worker
+# methods side by side, as they are offered
+SIDES: dict[str, tuple[Method, ...]] = {
+    "off": (), "SSD · PSD": ("skin", "pose-space"), "SI · PSD": ("interpolation", "pose-space"),
+    "PSD · WPSD": ("pose-space", "weighted"),
+    "SSD · SI · PSD · WPSD": ("skin", "interpolation", "pose-space", "weighted"),
+}
+
+
+class _Shades(NamedTuple):
+    """A field ready to be drawn: places (V,) on its ramp, and its legend."""
+
+    values: Points
+    legend: Legend
+
+
+class PoseViews(QObject):
+    """What is shown of the mesh that is posed. fresh : something that took long has come, look again."""
+
+    fresh = Signal()
+
+    def __init__(self, desk: Desk) -> None:
+        super().__init__(desk)
+        self.desk = desk
+        self._last: dict[Hashable, Any] = {}
+        self._running: set[Hashable] = set()
+        self._failed: dict[Hashable, tuple[Any, ...]] = {}
+        desk.session_replaced.connect(self._forget)
+
+    @property
+    def methods(self) -> tuple[Method, ...]:
+        """The methods side by side; none for the usual view."""
+        item = self.desk.posed
+        if self.desk.session.tool.craft != "pose" or item is None or item.hidden:
+            return ()
+        known = tuple(m for m in METHODS if m in self.desk.workspace.view.compare)
+        return known if len(known) > 1 else ()
+
+    @property
+    def heat(self) -> View | None:
+        """What is shown as colours: as chosen, else what the tool in the hand paints."""
+        if self.desk.session.tool.craft != "pose":
+            return None
+        chosen = self.desk.workspace.view.heat
+        for kind in VIEWS:
+            if kind == chosen:
+                return kind
+        paints: dict[str, View] = {"mask": "mask", "weights": "weight"}
+        return paints.get(self.desk.session.tool.edits)
+
+    def panes(self, scene: Scene) -> tuple[Pane, ...]:
+        """The scene as it is shown: in one pane or in several, the posed mesh in its colours."""
+        item, methods = self.desk.posed, self.methods
+        if item is None or item.rig is None or (not methods and self.heat is None):
+            return (Pane(scene),)
+        triangles = skin_at_rest(item.mesh, self.desk.session.evaluator).triangles.vertices
+        at = next((i for i, s in enumerate(scene.surfaces) if s.triangles is triangles), None)
+        if at is None:
+            return (Pane(scene),)
+        if not methods:
+            shades = self._shades(item, scene.surfaces[at].points, "")
+            surface = _shaded(scene.surfaces[at], shades)
+            return (Pane(_with(scene, at, surface), "", self._legend(item, shades)),)
+        return tuple(self._pane(scene, at, item, method) for method in methods)
+
+    def _pane(self, scene: Scene, at: int, item: MeshObject, method: Method) -> Pane:
+        """The mesh by a method, without hair, which follows the usual one."""
+        bare, evaluator = scene._replace(coats=(), guides=()), self.desk.session.evaluator
+        name, correctives = LABELS[method], None
+        if method != "skin" and item.correctives is not None:
+            key = "method", item.id, method
+            correctives = self._found(
+                key, True, f"Taking the sculpts as {name}", compared, item.mesh.points, item.rig, item.correctives,
+                method=method)
+            if correctives is None:
+                correctives, name = item.correctives, f"{name} …"
+        shown = item.replace(correctives=correctives)
+        points = shown_points(shown, self.desk.workspace.frame, evaluator)
+        normals = skin_at_rest(item.mesh, evaluator).normals if points is item.mesh.points else \
+            evaluator.get(_normals, item.mesh, points)
+        surface = scene.surfaces[at]._replace(points=points, normals=normals)
+        shades = self._shades(shown, points, method)
+        return Pane(_with(bare, at, _shaded(surface, shades)), name, self._legend(item, shades))
+
+    def _legend(self, item: MeshObject, shades: _Shades | None) -> Legend | None:
+        """What the colours mean, or what is to be done so that there are some."""
+        if shades is None and self.heat == "weight" and _joint(item) is None:
+            return Legend("Click a joint to see its weights", ("0", "0.5", "1"))
+        return None if shades is None else shades.legend
+
+    def _shades(self, item: MeshObject, shown: Points, method: str) -> _Shades | None:
+        """The field of a mesh posed at `shown`; None where there is none, or not yet."""
+        kind, rig, evaluator = self.heat, item.rig, self.desk.session.evaluator
+        if kind is None or rig is None:
+            return None
+        key, slow = (kind, item.id, method), len(item.mesh.points) > MANY
+        words = f"Colours of the {kind} view"
+        if kind == "mask":
+            return evaluator.get(_mask, item.mesh, item.mask)
+        if kind == "weight":
+            joint = _joint(item)
+            return None if joint is None else evaluator.get(_weight, rig, joint=joint)
+        if kind == "strain":
+            return self._found(key, slow, words, _strain, item.mesh, shown, evaluator=evaluator)
+        if kind == "shape":
+            plain = shown_points(item.replace(correctives=None, surface=None), self.desk.workspace.frame, evaluator)
+            return self._found(key, slow, words, _shape, item.mesh, plain, shown)
+        if kind == "error":
+            sculpts = None if self.desk.posed is None else self.desk.posed.correctives
+            return None if sculpts is None else self._found(
+                key, True, words, _error, item.mesh, rig, sculpts, item.correctives)
+        pose = item.pose if item.pose is not None else evaluator.get(pose_at, rig, frame=self.desk.workspace.frame)
+        if kind == "delta":
+            return self._found(key, slow, words, _delta, item.mesh, rig, item.correctives, pose, evaluator=evaluator)
+        return self._found(key, slow, words, _condition, item.mesh, rig, pose)
+
+    def _found(
+        self, key: Hashable, slow: bool, words: str, function: Callable[..., Result], *inputs: Any, **params: Hashable
+    ) -> Result | None:
+        """A value made of immutable ones: at once where it is quick or known, else that before until a job has it."""
+        evaluator = self.desk.session.evaluator
+        if not slow or evaluator.knows(function, *inputs, **params):
+            self._last[key] = evaluator.get(function, *inputs, **params)
+        elif key not in self._running and not _same(self._failed.get(key), inputs):
+            self._running.add(key)
+
+            def done(found: object) -> None:
+                self._running.discard(key)
+                self.fresh.emit()
+
+            def failed(error: Exception) -> None:
+                self._running.discard(key)
+                self._failed[key] = inputs
+                if isinstance(error, UserError):
+                    self.desk.said.emit(str(error))
+
+            self.desk.jobs.start(
+                words, lambda progress, cancelled: evaluator.get(function, *inputs, **params), done, failed, self)
+        found: Result | None = self._last.get(key)
+        return found
+
+    def _forget(self) -> None:
+        self._last.clear()
+        self._running.clear()
+        self._failed.clear()
+
+
+def _joint(item: MeshObject) -> str | None:
+    """The joint whose weights are shown: the active one of those that are selected."""
+    names = () if item.rig is None else item.rig.skeleton.names
+    return next((name for name in reversed(item.joint_selection) if name in names), None)
+
+
+def _same(failed: tuple[Any, ...] | None, inputs: tuple[Any, ...]) -> bool:
+    return failed is not None and all(a is b for a, b in zip(failed, inputs, strict=True))
+
+
+def _with(scene: Scene, at: int, surface: Surface) -> Scene:
+    return scene._replace(surfaces=(*scene.surfaces[:at], surface, *scene.surfaces[at + 1 :]))
+
+
+def _shaded(surface: Surface, shades: _Shades | None) -> Surface:
+    if shades is None or len(shades.values) != len(surface.points):
+        return surface
+    return surface._replace(values=shades.values, ramp="signed" if shades.legend.signed else "heat")
+
+
+def _drawn(heat: Heat) -> _Shades:
+    return _Shades(freeze(heat.shares()), Legend(heat.title, heat.ticks, heat.signed))
+
+
+def _normals(mesh: Mesh, points: Points) -> Points:
+    normals: Points = freeze(mesh_normals(mesh, points))
+    return normals
+
+
+# as the evaluator remembers them
+
+
+def _mask(mesh: Mesh, mask: Points | None) -> _Shades:
+    return _drawn(mask_heat(np.zeros(len(mesh.points), np.float32) if mask is None else mask))
+
+
+def _weight(rig: Rig, joint: str) -> _Shades:
+    return _drawn(weight_heat(rig, joint))
+
+
+def _strain(mesh: Mesh, shown: Points, evaluator: Evaluator) -> _Shades:
+    return _drawn(strain_heat(mesh, evaluator.get(edge_vertices, mesh), shown))
+
+
+def _shape(mesh: Mesh, plain: Points, shown: Points) -> _Shades:
+    return _drawn(shape_heat(mesh, plain, shown))
+
+
+def _error(mesh: Mesh, rig: Rig, sculpts: Correctives, correctives: Correctives | None) -> _Shades:
+    return _drawn(error_heat(mesh, rig, sculpts, correctives))
+
+
+def _delta(mesh: Mesh, rig: Rig, correctives: Correctives | None, pose: Pose, evaluator: Evaluator) -> _Shades:
+    prepared = () if correctives is None else evaluator.get(prepare, correctives, rig)
+    return _drawn(delta_heat(mesh, rig, prepared, pose))
+
+
+def _condition(mesh: Mesh, rig: Rig, pose: Pose) -> _Shades:
+    return _drawn(condition_heat(rig, len(mesh.points), pose))
