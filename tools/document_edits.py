@@ -30,7 +30,7 @@ from core.evaluator import Evaluator
 from core.formats.mesh_file import read_mesh
 from core.formats.picture import read_picture
 from core.groom.dress import Stage, dress, no_stages
-from core.groom.groom import COAT_VALUES, Groom, Map
+from core.groom.groom import COAT_VALUES, LONGEST, Coat, Groom, Map
 from core.groom.guides import Guides
 from core.groom.maps import sample_vertex_map
 from core.groom.rows import no_guides
@@ -44,6 +44,7 @@ from core.record import freeze
 from core.value import names_used
 
 GUIDES, HAIRS = 2500, 100_000  # of a first coat
+FIRST_REACH = 0.05  # of a groom planted by hand, in sizes of the animal
 
 
 # meshes
@@ -188,8 +189,14 @@ def add_styled_groom(
 
 
 def add_empty_groom(document: Document, mesh_id: int, name: str = "groom", points: int = 16) -> Document:
-    """The document with a groom without guides on a mesh, to be planted by hand; its guides will have `points`."""
-    return add_groom(document, Groom(id=0, name=_name(name), mesh_id=mesh_id, guides=no_guides(points)))
+    """The document with a groom without guides on a mesh, to be planted by hand; its guides will have `points`.
+
+    Its hair grows around the guides only, up to a twentieth of the size of the animal.
+    """
+    points_at_rest = find_mesh(document, mesh_id).mesh.points
+    size = float(np.linalg.norm(np.ptp(points_at_rest, axis=0))) if len(points_at_rest) else 0.0
+    coat = Coat(reach=min(float(f"{FIRST_REACH * size:.2g}"), LONGEST))
+    return add_groom(document, Groom(id=0, name=_name(name), mesh_id=mesh_id, guides=no_guides(points), coat=coat))
 
 
 def remove_groom(document: Document, groom_id: int) -> Document:

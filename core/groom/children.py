@@ -94,6 +94,9 @@ class Children:
         self.triangle_uvs = triangle_uvs
         self.skin_points: NDArray[np.float32] | None = None
         self.skin_normals: NDArray[np.float32] | None = None
+        # how far each is from its nearest guide, of which roots and up to which reach; see core.groom.reach
+        self.near: tuple[object, float, NDArray[np.float32]] | None = None
+        self.footing: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32]] | None = None  # likewise
         self._points: NDArray[np.float32] | None = None
         self._prepared = np.empty((0, 4, count), np.float32)
         self._row_of: NDArray[np.int32] | None = None
@@ -126,6 +129,7 @@ class Children:
     def rebind(self, rebound: Rebound) -> NDArray[np.int32]:
         """Take over changed bindings; the rows to be evaluated again. Rows keep their place, ids their row."""
         rows = self.row_of[rebound.rows]
+        self.near = None
         self.sites[rows] = rebound.sites
         before = self._guides if len(rows) < len(self) else 0
         self._guides = max(before, int(rebound.sites.max()) + 1 if len(rows) else 0)

@@ -6,23 +6,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.evaluator import Evaluator
 from core.groom.children import Children, Number, Shape, Traits
 from core.groom.groom import COAT_FIELDS, COAT_VALUES, Groom
 from core.groom.maps import sample_map
+from core.groom.reach import presence
 from core.mesh.mesh import Mesh
 from core.mesh.skin import Skin
 from core.random import rand
 from core.value import ValueFault, evaluate_within, names_used
 
 
-def set_coat(children: Children, groom: Groom, mesh: Mesh, rest: Skin, frame: float) -> None:
+def set_coat(
+    children: Children, groom: Groom, mesh: Mesh, rest: Skin, frame: float, evaluator: Evaluator
+) -> None:
     """Write the coat at a frame into ``children.length`` and ``children.traits``. Evaluate all children next.
 
     What is the same for all hairs stays one number; only what an expression or a map makes different is a column.
 
     Parameters
     ----------
-    rest : the skin of `mesh` at rest, where maps are read.
+    groom : its guides are those the children are bound to. rest : the skin of `mesh` at rest, where maps are read.
 
     Raises
     ------
@@ -37,8 +41,12 @@ def set_coat(children: Children, groom: Groom, mesh: Mesh, rest: Skin, frame: fl
     if item is not None:
         factor = factor * sample_map(item, mesh, rest.triangles, children.triangle, children.barycentric())
     children.length = np.ascontiguousarray(factor, np.float32)
+    density = numbers["density"]
+    left = presence(children, groom.guides, mesh, rest, coat.reach, evaluator) if coat.reach > 0.0 else None
+    if left is not None:
+        density = np.asarray(density * left, np.float32)
     children.traits = Traits(
-        Shape(numbers["clump"], numbers["frizz"], coat.seed), numbers["density"], numbers["width_root"],
+        Shape(numbers["clump"], numbers["frizz"], coat.seed), density, numbers["width_root"],
         numbers["width_tip"],
     )
 

@@ -42,6 +42,10 @@ class Coat(Record):
         "Density", "The share of the hairs that is kept; the others stay where they are when you change it.",
         soft=(0.0, 1.0), hard=(0.0, 1.0),
     )] = constant(1.0)
+    reach: Annotated[float, field(
+        "Reach", "How far over the skin hair grows from the nearest guide, thinning out; 0 m grows it everywhere.",
+        "m", soft=(0.0, 0.2), hard=(0.0, LONGEST),
+    )] = 0.0
     length: Annotated[Value, value_field(
         "Length", "Factor on the length of the guides for every hair; 1 is as long as the guides around it.",
         soft=(0.0, 2.0), hard=(0.0, LONGEST),

@@ -61,7 +61,7 @@ def grow(
             places.triangle, places.barycentric, binding, rest.triangles.vertices, uvs, coat.points, workers.ranges
         )
     with stage("evaluate"):
-        set_coat(children, groom, mesh, rest, frame)
+        set_coat(children, groom, mesh, rest, frame, evaluator)
         posed = skin is not rest
         points = strands_on_deformed(mesh, guides.roots, guides.points, skin.points) if posed else guides.points
         normals = root_normals(mesh, guides.roots, skin.points if posed else None)

@@ -78,7 +78,7 @@ class LiveCoat:
         if len(groom.guides) == 0:
             raise UserError("this groom has no guides; plant some before hair can grow")
         rest = skin_at_rest(mesh, evaluator)
-        self.mesh, self._skin, self._workers = mesh, rest, evaluator.workers
+        self.mesh, self._skin, self._workers, self._evaluator = mesh, rest, evaluator.workers, evaluator
         self._key = _growth_key(groom)
         self._at_rest = Posed(rest.points, rest.normals)
         places = places_of(groom, mesh, evaluator)
@@ -251,15 +251,22 @@ class LiveCoat:
         if moved.any():
             self._owed[self.children.rows_of(moved, self._workers.ranges)] = EVALUATE
 
+    def _reaches_alike(self, reach: float) -> bool:
+        """True when the distances to the guides are those the hairs were last thinned out by, or none count."""
+        near = self.children.near
+        return reach == 0.0 or (near is not None and near[0] is self.guides.roots)
+
     def _follow_values(self, groom: Groom, frame: float) -> None:
         before = self._groom
-        if before is not None and _same_values(before, groom) and (frame == self._frame or not _animated(groom)):
+        alike = before is not None and _same_values(before, groom) and self._reaches_alike(groom.coat.reach)
+        if alike and (frame == self._frame or not _animated(groom)):
             return
         self._groom, self._frame = groom, frame
         children = self.children
         length, traits = children.length, children.traits
         try:
-            set_coat(children, groom, self.mesh, self._skin, frame)
+            bound = groom if groom.guides is self.guides else groom.replace(guides=self.guides)
+            set_coat(children, bound, self.mesh, self._skin, frame, self._evaluator)
             self.trouble = None
         except UserError as error:
             self.trouble = error
@@ -294,7 +301,7 @@ def _same_values(a: Groom, b: Groom) -> bool:
     """True when no hair can be another, whatever else of the coats differs."""
     return a.maps is b.maps and all(
         getattr(a.coat, name) is getattr(b.coat, name) or getattr(a.coat, name) == getattr(b.coat, name)
-        for name in (*COAT_VALUES, "seed", "length_map")
+        for name in (*COAT_VALUES, "seed", "length_map", "reach")
     )
 
 
