@@ -23,11 +23,11 @@ from core.pose import edit_layers
 from core.pose.carry import carried_surface, mirrored_surface
 from core.pose.clip import onto_skeleton, resampled
 from core.pose.constraints import constrained
-from core.pose.controls import rotation_dof, without_noise
+from core.pose.controls import NOISE, rotation_dof, without_noise
 from core.pose.corrective import as_kind
 from core.pose.layers import space_dofs
 from core.pose.mirror_pose import mirror_of_rig, mirrored_space
-from core.pose.pose import SAME, Pose
+from core.pose.pose import Pose
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, Way
 from core.pose.refusal import Refusal
 from core.pose.rig import Constraint, Rig, all_clips
@@ -396,10 +396,10 @@ def sculpt_name(correctives: Correctives | None, pose: Pose) -> str:
 
 
 def same_pose(one: Pose, other: Pose) -> bool:
-    """True when two poses put every control in the same place, whatever their names are."""
+    """True when two poses put every control in the same place but for the rounding of clips, whatever their names."""
     def differs(a: Mapping[str, Any], b: Mapping[str, Any], rest: Any) -> bool:
         both = a.keys() | b.keys()
-        return any(np.abs(np.subtract(a.get(c, rest), b.get(c, rest))).max() > SAME for c in both)
+        return any(np.abs(np.subtract(a.get(c, rest), b.get(c, rest))).max() > NOISE for c in both)
 
     turned = (0.0, 0.0, 0.0, 1.0)
     return not (

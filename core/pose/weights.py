@@ -107,7 +107,7 @@ def smoothed(
     both = np.concatenate([ends, ends[:, ::-1]])
     near = csr_matrix((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count))
     near.data[:] = 1.0  # an edge that is named twice counts once
-    joints = _joints(skin)
+    joints = max(_joints(skin), 0 if joint is None else joint + 1)
     whole = csr_matrix(
         (skin.weights.ravel().astype(np.float64),
          (np.repeat(np.arange(count), skin.joints.shape[1]), skin.joints.ravel())), shape=(count, joints),

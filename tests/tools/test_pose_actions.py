@@ -241,11 +241,29 @@ def test_a_duplicate_is_refused_by_name_and_each_offer_mends_it():
 def test_a_near_duplicate_is_refused_and_the_offers_mend_it():
     near = turned("near", arm_L=(0, 40.00003, 30))
     for offer, left in (("merge", ["left"]), ("delete", ["near"])):
-        s = session(pose=near)
+        s = session()
+        sculpted(s, LEFT)
+        with pytest.raises(Refusal) as refused:
+            s.edit("Add", pose_edits.add_sculpt_as_seen, 1, near)
+        assert (refused.value.reason, set(refused.value.poses)) == ("near-duplicate", {"left", "near"})
+        s.edit("Add", pose_edits.add_sculpt_as_seen, 1, near, offer)
+        assert names(s) == left
+
+
+def test_a_pose_nearer_than_rounding_goes_on_with_the_sculpt_there():
+    s = session(pose=turned("held", arm_L=(0, 40.00003, 30)))
+    sculpted(s, LEFT)
+    act(s, "add_sculpt", name="another")
+    assert names(s) == ["left"]
+
+
+def test_poses_hardly_apart_are_refused_as_singular_and_the_offers_mend_it():
+    for offer, left in (("merge", ["left"]), ("delete", ["near"])):
+        s = session(pose=turned("held", arm_L=(0, 40.0003, 30)))
         sculpted(s, LEFT)
         with pytest.raises(Refusal) as refused:
             s.act("add_sculpt", name="near")
-        assert (refused.value.reason, set(refused.value.poses)) == ("near-duplicate", {"left", "near"})
+        assert (refused.value.reason, set(refused.value.poses)) == ("singular", {"left", "near"})
         act(s, "add_sculpt", name="near", twins=offer)
         assert names(s) == left
 

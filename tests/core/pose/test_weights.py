@@ -96,6 +96,13 @@ def test_smoothing_is_the_mean_of_the_neighbours():
     assert np.allclose(weights_of(skin, 0), 0.5, atol=0.01)
 
 
+def test_smoothing_a_joint_that_moves_nothing_yet_changes_nothing():
+    skin = compacted([[0, 1], [0, 1]], [[0.5, 0.5], [0.25, 0.75]])
+    after = smoothed(skin, [[0, 1]], np.ones(2), joint=3)
+    np.testing.assert_allclose(weights_of(after, 0), weights_of(skin, 0), atol=1e-7)
+    assert not weights_of(after, 3).any()
+
+
 def test_limit_and_prune():
     skin = some_skin(influences=6)
     was = table(skin)
