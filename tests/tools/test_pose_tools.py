@@ -11,13 +11,16 @@ from core.document import find_mesh, with_mesh
 from core.errors import UserError
 from core.history import History
 from core.leaves import same_bits
+from core.pose.carry import carried_surface
 from core.pose.pose import Pose
 from core.pose.sculpt.symmetry import opposites_by_axis
+from core.pose.synthesis import evaluate
 from core.posed import skin_at
 from core.workspace import Respect, Workspace
 from tests.tools.scenes import BENT, EVALUATOR, line, pointers, rig, session, sight
 from tools.macro import play
 from tools.pose.weights import WeightParams
+from tools.pose_edits import add_sculpt
 from tools.registry import Registry
 from tools.session import Session
 
@@ -104,6 +107,27 @@ def test_a_mask_spares_what_it_covers_and_is_undone():
     np.testing.assert_allclose(points_of(s)[mask == 1.0], before[mask == 1.0], atol=1e-6)
     s.jump(1)
     assert s.document.meshes[0].mask is None
+
+
+def test_restore_goes_towards_the_shape_of_another_pose():
+    s = held()
+    far = Pose(name="far", rotations={"top": (math.sin(0.6), 0.0, 0.0, math.cos(0.6))})
+    push = np.where(s.document.meshes[0].mesh.points[:, 1:2] > 0.0, np.float32([0.0, 0.0, 0.1]), np.float32(0))
+    points, moved = s.document.meshes[0].mesh.points, points_of(s)
+    s.edit("Sculpt", add_sculpt, 1, far, evaluate(points, rig(), None, far) + push)
+    s.edit("Still here", add_sculpt, 1, NODDED.replace(name="here"), evaluate(points, rig(), None, NODDED))
+    before = points_of(s)
+    assert np.abs(before - moved).max() < 1e-5
+    goal = carried_surface(points, rig(), s.document.meshes[0].correctives, far, NODDED)
+    s.choose("restore", size=80.0, strength=1.0, towards="far")
+    s.hand.stroke(sight(), WAY)
+    away, now = np.linalg.norm(goal - before, axis=1), np.linalg.norm(goal - points_of(s), axis=1)
+    assert away.max() > 0.09
+    assert (now <= away + 1e-5).all()
+    assert (now < 0.5 * away)[away > 0.05].sum() > 5
+    s.choose("restore", towards="nowhere")
+    with pytest.raises(UserError, match="no pose 'nowhere'"):
+        s.hand.press(sight(), WAY[0])
 
 
 def test_weights_are_painted_for_the_active_joint_and_locks_hold():

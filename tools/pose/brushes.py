@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.field import field
+from core.mesh.mesh import Mesh
 from core.overlay import Overlays
+from core.pose.carry import carried_surface
+from core.pose.pose import Pose
+from core.pose.pose_space import Correctives
+from core.pose.rig import Rig
 from core.pose.rotation import polar_rotation
 from core.pose.sculpt import brushes
 from core.pose.sculpt.ring import Ring
 from core.pose.sculpt.symmetry import reflected
 from core.posed import held_points
+from core.record import freeze
 from tools.brush import DAB, RingStroke
 from tools.pose.craft import Points, PoseGround
+from tools.pose_edits import pose_named
 from tools.ring import BrushParams, ring_radius, ring_strength
 from tools.tool import Hit, Pointer, Stroke, Tool, Turn
 
@@ -284,6 +291,13 @@ class Flatten(Sculpt):
         return brushes.flatten(ground.surface, points, ring, self.sign * min(dose, 1.0))
 
 
+class RestoreParams(SculptParams):
+    """Settings of Restore."""
+
+    towards: Annotated[str, field(
+        "Towards", "Name of the sculpted or stored pose whose shape is taken; empty goes back to the skin.")] = ""
+
+
 class Restore(Sculpt):
     """Takes sculpting back."""
 
@@ -291,12 +305,30 @@ class Restore(Sculpt):
     label = "Restore"
     icon = "restore"
     order = 124
-    tooltip = "Brings the surface under the ring back to what the skin alone gives at this pose."
+    tooltip = "Brings the surface under the ring back to what the skin alone gives, or to another pose's shape."
     hint = "Drag: take the sculpt back   Shift: smooth"
     step = "Restore"
+    Params = RestoreParams
+
+    def begin(self, ground: PoseGround, pointer: Pointer) -> Stroke[Points]:
+        """A stroke of dabs; UserError when the pose it goes towards is not there."""
+        self.goal(ground)
+        return super().begin(ground, pointer)
+
+    def goal(self, ground: PoseGround) -> Points:
+        """The surface (V, 3) that it goes towards, remembered."""
+        item, evaluator = ground.item, ground.evaluator
+        if not self.params.towards:
+            bare: Points = evaluator.get(held_points, item.mesh, ground.rig, None, ground.pose, evaluator=evaluator)
+            return bare
+        other = pose_named(item, self.params.towards)
+        carried: Points = evaluator.get(_carried, item.mesh, ground.rig, item.correctives, other, ground.pose)
+        return carried
 
     def dab(self, ground: PoseGround, points: Points, ring: Ring, dose: float) -> Points:
-        """A little nearer to the skin."""
-        evaluator = ground.evaluator
-        bare = evaluator.get(held_points, ground.item.mesh, ground.rig, None, ground.pose, evaluator=evaluator)
-        return brushes.restore(ground.surface, points, ring, bare, min(2.0 * dose, 1.0))
+        """A little nearer to it."""
+        return brushes.restore(ground.surface, points, ring, self.goal(ground), min(2.0 * dose, 1.0))
+
+
+def _carried(mesh: Mesh, rig: Rig, correctives: Correctives | None, source: Pose, at: Pose) -> Points:
+    return freeze(carried_surface(mesh.points, rig, correctives, source, at))

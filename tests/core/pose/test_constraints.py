@@ -62,10 +62,34 @@ def test_half_of_it_is_half_the_angle():
     assert np.isclose(angle(1.0), np.radians(60))
 
 
+@pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("one", [
+    Constraint(joint="hand", kind="orient", target="upper"), Constraint(joint="hand", kind="point", target="root"),
+    Constraint(joint="hand", kind="aim", target="root", axis=(0.0, 0.0, 1.0)),
+    Constraint(joint="fore", kind="limit", low=(-0.1, -0.2, 0.0), high=(0.1, 0.2, 0.3)),
+], ids=lambda c: c.kind)
+def test_done_twice_it_is_what_it_is_done_once(one, weight):
+    """So a pose that is held again and again does not creep."""
+    one = one.replace(weight=weight)
+    pose = turned("any", upper=(10, 20, 30), fore=(40, -50, 60), hand=(25, 15, -70))
+    once = constrained(SKELETON, (one,), pose)
+    twice = constrained(SKELETON, (one,), once)
+    assert np.abs(local_of_pose(SKELETON, once) - local_of_pose(SKELETON, twice)).max() < 1e-9
+
+
+def test_an_aim_leaves_the_twist_about_its_axis_to_the_hand():
+    aim = Constraint(joint="hand", kind="aim", target="root", axis=(0.0, 0.0, 1.0), weight=0.5)
+    turns = [world(constrained(SKELETON, (aim,), turned("any", hand=(0, 0, z))))["hand"][:3, :3] for z in (0, 35)]
+    apart = turns[0].T @ turns[1]
+    assert np.allclose(apart @ [0, 0, 1], [0, 0, 1])
+    assert np.isclose(np.degrees(np.arctan2(apart[1, 0], apart[0, 0])), 35)
+
+
 def test_what_hangs_from_a_joint_cannot_lead_it():
-    loop = Constraint(joint="upper", kind="point", target="hand")
     bent = turned("bent", fore=(0, 0, 60))
-    assert constrained(SKELETON, (loop,), bent) is bent
+    for kind in ("point", "orient", "aim"):
+        loop = Constraint(joint="upper", kind=kind, target="hand")
+        assert constrained(SKELETON, (loop,), bent) is bent
 
 
 @pytest.mark.parametrize("fields", [

@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.pose.layers import Sculpt, build
-from core.pose.mirror_pose import mirror_of, mirrored_layer, mirrored_name, mirrored_pose, mirrored_space
+from core.pose.mirror_pose import mirror_of, mirror_of_rig, mirrored_layer, mirrored_name, mirrored_pose, mirrored_space
 from core.pose.pose import Pose, local_of_pose
 from core.pose.pose_space import Correctives, Dof, PoseSample, PoseSpace
-from core.pose.rig import Rig
+from core.pose.rig import Control, Rig
 from core.pose.skeleton import Skeleton, SkinWeights
 from core.pose.skinning import object_matrices
 from core.pose.solve import solve, weights
@@ -65,6 +65,17 @@ def test_names():
         assert mirrored_name(other) == name
     for same in ("bright", "Tail", "copyright", "spine1", "lr", "Rleg2x"):
         assert mirrored_name(same) == same
+
+
+def test_a_control_without_a_counterpart_is_its_own_and_joints_without_sides_find_theirs_by_place():
+    skeleton = body(tuple("abcdef"))
+    skin = SkinWeights(joints=np.zeros((1, 1), np.int32), weights=np.ones((1, 1), np.float32))
+    controls = tuple(Control(name=n) for n in ("smile_L", "smile_R", "blink_L", "mood"))
+    mirror = mirror_of_rig(Rig(skeleton=skeleton, skin=skin, controls=controls))
+    assert mirror.partners.tolist() == [0, 3, 4, 1, 2, 5]
+    pose = Pose(numbers={"smile_L": 1.0, "blink_L": 0.5, "mood": 0.25})
+    assert mirrored_pose(pose, mirror).numbers == {"smile_R": 1.0, "blink_L": 0.5, "mood": 0.25}
+    assert mirror_of_rig(Rig(skeleton=body(), skin=skin)).partners.tolist() == [0, 3, 4, 1, 2, 5]
 
 
 def test_a_mirrored_space_measures_the_same():
