@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.formats import usd_corrections
 from core.formats.rig_parts import RawClip, RawRig, RawShape, parents_first
 from core.mesh.mesh import Mesh
 from core.mesh.repair import PROBLEMS, repair
 from core.pose.blend_shapes import LEAST_APART, BlendShapes
 from core.pose.clip import check_frames, split_matrices, without_flips
+from core.pose.pose_space import Correctives
 from core.pose.rig import Control, Rig, all_clips
 from core.pose.skeleton import Clip, Skeleton
 from core.pose.weights import compacted, no_skin
@@ -34,6 +36,7 @@ class RigFile(NamedTuple):
     rig : its skin has one row for each vertex of `mesh`; its first clip plays.
     clips : all clips. notes : sentences to show.
     name : of the file, without its suffix. metres_per_unit, up : the space that was used.
+    correctives : where we wrote the file ourselves.
     """
 
     mesh: Mesh | None
@@ -43,6 +46,7 @@ class RigFile(NamedTuple):
     name: str
     metres_per_unit: float
     up: str
+    correctives: Correctives | None = None
 
 
 def assemble(raw: RawRig, name: str, metres_given: float | None, up_given: str | None) -> RigFile:
@@ -66,6 +70,13 @@ def assemble(raw: RawRig, name: str, metres_given: float | None, up_given: str |
         if metres_given is None:
             notes.append(f"{name} does not say its unit: metres assumed; set --unit to change that.")
     up = raw.up if raw.up in ("y", "z") else (up_given or "y")
+    found = raw.sculpts
+    same_space = metres == 1.0 and up == "y" and raw.polygons is not None
+    if found is not None and same_space and usd_corrections.fits(found, raw.polygons.points):  # type: ignore[union-attr]
+        raw = usd_corrections.without_corrections(raw)
+    elif found is not None:
+        found = None
+        notes.append("Its mesh is not the one its corrections were sculpted on; they are blend shapes now.")
     raw = _to_metres(raw, metres, up)
     skeleton, row_of = _skeleton(raw, notes)
     mesh, file_vertices, skin, shapes = None, None, no_skin(0), None
@@ -99,7 +110,15 @@ def assemble(raw: RawRig, name: str, metres_given: float | None, up_given: str |
         skinning="dual-quaternion" if raw.skinning == "dual-quaternion" else "linear", controls=controls,
         file_vertices=file_vertices,
     )
-    return RigFile(mesh, rig, all_clips(rig), tuple(dict.fromkeys(notes)), name, metres, up)
+    correctives = None
+    if found is not None and mesh is not None:
+        try:
+            if not usd_corrections.fits(found, mesh.points):
+                raise ValueError("vertices were welded")
+            rig, correctives = usd_corrections.restored(found, rig)
+        except (ValueError, KeyError, TypeError):
+            notes.append("Its corrections contradict themselves and are left out; export the rig again.")
+    return RigFile(mesh, rig, all_clips(rig), tuple(dict.fromkeys(notes)), name, metres, up, correctives)
 
 
 def _to_metres(raw: RawRig, metres: float, up: str) -> RawRig:

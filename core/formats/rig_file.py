@@ -84,7 +84,7 @@ def document_of(found: RigFile) -> Document:
     """
     if found.mesh is None:
         raise UserError(f"{found.name} has a skeleton but no mesh; open the rig that it moves.")
-    item = MeshObject(id=1, name=found.name, mesh=found.mesh, rig=found.rig)
+    item = MeshObject(id=1, name=found.name, mesh=found.mesh, rig=found.rig, correctives=found.correctives)
     clip = found.rig.clip
     if clip is None:
         return Document(meshes=(item,))

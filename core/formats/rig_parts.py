@@ -37,6 +37,13 @@ class RawShape(NamedTuple):
     offsets: NDArray[np.float64]
 
 
+class RawSculpts(NamedTuple):
+    """Corrections as ``core.formats.usd_corrections`` wrote them: JSON, and arrays by name."""
+
+    said: str
+    arrays: Mapping[str, NDArray[Any]]
+
+
 class RawRig(NamedTuple):
     """A rig as it stands in a file, units and axes of the file.
 
@@ -60,6 +67,7 @@ class RawRig(NamedTuple):
     metres_per_unit: float | None = None
     up: str | None = None
     notes: tuple[str, ...] = ()
+    sculpts: RawSculpts | None = None
 
 
 class RigPiece(NamedTuple):
@@ -239,6 +247,9 @@ def pack_rig(raw: RawRig) -> dict[str, Any]:
     for row, clip in enumerate(raw.clips):
         for field in ("translations", "rotations", "scales", "numbers"):
             answer[f"clip{row}_{field}"] = getattr(clip, field)
+    if raw.sculpts is not None:
+        answer["sculpts"] = raw.sculpts.said
+        answer |= {f"sculpts {name}": array for name, array in raw.sculpts.arrays.items()}
     return answer
 
 
@@ -261,8 +272,12 @@ def unpack_rig(answer: dict[str, Any]) -> RawRig:
         )
         for row, (name, start, rate, numbers) in enumerate(answer["clip_heads"])
     ]  # fmt: skip
+    sculpts = None
+    if "sculpts" in answer:
+        arrays = {key.removeprefix("sculpts "): value for key, value in answer.items() if key.startswith("sculpts ")}
+        sculpts = RawSculpts(answer["sculpts"], arrays)
     return RawRig(
         polygons, tuple(answer["names"]), answer["parents"], answer["rest"], answer["bind"], answer["joints"],
         answer["weights"], tuple(shapes), answer["rests"], tuple(clips), answer["skinning"],
-        answer["metres_per_unit"], answer["up"], tuple(answer["notes"]),
+        answer["metres_per_unit"], answer["up"], tuple(answer["notes"]), sculpts,
     )  # fmt: skip

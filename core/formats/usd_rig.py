@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.formats import usd_corrections
 from core.formats.mesh_pieces import unique_names
 from core.formats.rig_parts import (
     RawClip,
@@ -92,6 +93,7 @@ def read_in_child(path: str) -> dict[str, Any]:
         "dual-quaternion" if "dualQuaternion" in methods else "linear",
         float(UsdGeom.GetStageMetersPerUnit(stage)) if said("metersPerUnit") else None,
         str(UsdGeom.GetStageUpAxis(stage)).lower() if said("upAxis") else None, tuple(notes),
+        usd_corrections.read(stage),
     ))  # fmt: skip
 
 

@@ -2,7 +2,8 @@
 
 Corrections become blend shapes whose weights are baked along the clip. What drives them stands as JSON in the custom
 data ``filoplume:drivers`` of the SkelRoot: every shape with its layer and sample, and every layer with its pose space
-(kernel, degrees of freedom with axes and falloffs, poses), which is all that is needed to drive them anew.
+(kernel, degrees of freedom with axes and falloffs, poses), which is all that is needed to drive them anew. The layers
+themselves are kept by ``usd_corrections``.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from core.document import MeshObject
 from core.errors import UserError
+from core.formats import usd_corrections
 from core.formats.corrective_shapes import CorrectiveShapes, corrective_shapes, shape_weights_at
 from core.pose.blend_shapes import BlendShapes, dense_offsets, shape_weights
 from core.pose.pose_space import PoseSpace
@@ -58,6 +60,7 @@ def write(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:
     shapes = _shapes(stage, mesh, rig.shapes, found)
     _animation(stage, rig, tokens, item, found, shapes, skeleton)
     root.GetPrim().SetCustomDataByKey(DRIVERS, _drivers(found, shapes))
+    usd_corrections.write(stage, item, shapes)
     if not layer.Export(str(path)):
         raise UserError(f"{path.name} could not be written; choose another folder.")
     return found.notes

@@ -7,17 +7,21 @@ import re
 import numpy as np
 import pytest
 
+from core.document import Document
 from core.errors import UserError
 from core.formats.corrective_shapes import corrective_shapes, shape_weights_at
 from core.formats.pose_drivers import mel_assignments, program, python_function
 from core.formats.pose_export import write, write_points
-from core.formats.rig_file import read_rig
-from core.pose.blend_shapes import dense_offsets
+from core.formats.project import read_project, write_project
+from core.formats.rig_file import document_of, read_rig
+from core.leaves import same_bits
 from core.pose.corrective import as_kind
 from core.pose.pose import Pose, local_of_pose
+from core.pose.rig import Constraint, Control
 from core.pose.rotation import euler_from_quaternion
 from core.pose.skinning import deformed, posed_points
 from core.pose.synthesis import evaluate, evaluate_at, pose_at, prepare
+from core.record import freeze
 from tests.core.formats.posed_samples import BENT, BOTH, ELSEWHERE, FLEXED, HALF, TWISTED, posed_arm, turned
 
 EARLY = (BENT, HALF, TWISTED, FLEXED, BOTH)  # none of which is corrected after skinning
@@ -59,7 +63,8 @@ def test_the_baked_clip_read_back_moves_as_ours(item, suffix, tmp_path):
     file = np.arange(len(item.mesh.points)) if found.rig.file_vertices is None else None
     for sample in range(len(clip.translations)):
         ours = evaluate_at(item.mesh.points, item.rig, ready, item.rig.clip.start + sample)
-        theirs = posed_points(found.mesh.points, found.rig, clip.start + sample)
+        layers = prepare(found.correctives, found.rig)  # of .glb there are none: its shapes are the corrections
+        theirs = evaluate_at(found.mesh.points, found.rig, layers, clip.start + sample)
         if file is None:  # split at seams and welded again: the same places in another order
             theirs = theirs[by_place(found.mesh.points, item.mesh.points)]
         assert np.abs(ours - theirs).max() <= 2e-6 * size(item), sample
@@ -73,21 +78,61 @@ def by_place(points, wanted):
     return row
 
 
-def test_usd_round_trip_is_exact(item, tmp_path):
+@pytest.mark.parametrize("suffix", [".usdc", ".usda"])
+def test_a_rig_goes_out_and_comes_back_with_its_poses_and_layers(suffix, tmp_path):
+    """As it was built, by way of a project and USD: every array, every field, and the surface at any pose."""
+    made = posed_arm()  # some of which is corrected after skinning
+    constraint = Constraint(joint="wrist", kind="limit")
+    swing = Control(name="swing", kind="joint", joint="wrist", axis=(1.0, 0.0, 0.0), travel=0.1)
+    piece = Control(name="pad", kind="geometry", vertices=freeze(np.array([3, 9], np.int32)))
+    rig = made.rig.replace(controls=(*made.rig.controls, swing, piece), constraints=(constraint,))
+    off = made.correctives.layers[-1].replace(enabled=False)
+    made = made.replace(rig=rig, correctives=made.correctives.replace(layers=(*made.correctives.layers[:-1], off)))
+    write_project(tmp_path / "arm.filo", Document(meshes=(made,)))
+    item = read_project(tmp_path / "arm.filo").document.meshes[0]
+    write(tmp_path / f"arm{suffix}", item, 24.0)
+    found = read_rig(tmp_path / f"arm{suffix}")
+    assert found.notes == ()
+    assert np.array_equal(found.mesh.points, made.mesh.points)
+    assert np.array_equal(found.mesh.corners, made.mesh.corners)
+    assert found.rig.skeleton.names == rig.skeleton.names
+    assert np.allclose(found.rig.skeleton.bind, rig.skeleton.bind, atol=1e-12)
+    assert np.allclose(found.rig.skeleton.rest, rig.skeleton.rest, atol=1e-12)
+    for what in ("controls", "constraints", "shapes"):
+        assert same_bits(getattr(found.rig, what), getattr(rig, what)), what
+    assert same_bits(found.correctives, made.correctives)
+    for pose in ELSEWHERE:
+        ours = evaluate(made.mesh.points, rig, made.correctives, pose)
+        assert np.abs(evaluate(found.mesh.points, found.rig, found.correctives, pose) - ours).max() <= 2e-7 * size(made)
+    ready, again = prepare(made.correctives, rig), prepare(found.correctives, found.rig)
+    for frame in np.arange(rig.clip.start, rig.clip.end, 0.5):
+        ours = evaluate_at(made.mesh.points, rig, ready, frame)
+        theirs = evaluate_at(found.mesh.points, found.rig, again, frame)
+        assert np.abs(theirs - ours).max() <= 1e-6 * size(made)
+    assert document_of(found).meshes[0].correctives is found.correctives
+
+
+def test_corrections_of_a_mesh_that_was_edited_elsewhere_are_shapes(item, tmp_path):
+    from pxr import Usd, UsdGeom
+
     write(tmp_path / "arm.usdc", item, 24.0)
-    found = read_rig(tmp_path / "arm.usdc")
-    assert np.array_equal(found.mesh.points, item.mesh.points)
-    assert np.array_equal(found.mesh.corners, item.mesh.corners)
-    assert found.rig.skeleton.names == item.rig.skeleton.names
-    assert np.allclose(found.rig.skeleton.bind, item.rig.skeleton.bind, atol=1e-12)
-    assert np.allclose(found.rig.skeleton.rest, item.rig.skeleton.rest, atol=1e-12)
-    shapes = found.rig.shapes
-    assert set(shapes.names) == {"swell", *(s.name for s in corrective_shapes(item).shapes)}
-    count = len(item.mesh.points)
-    mine = np.flatnonzero(shapes.shape == shapes.names.index("swell"))
-    assert np.allclose(shapes.at[mine], [0.5, 1.0])  # the inbetween is kept
-    for target, own in zip(mine, range(2), strict=True):
-        assert np.array_equal(dense_offsets(shapes, int(target), count), dense_offsets(item.rig.shapes, own, count))
+    stage = Usd.Stage.Open(str(tmp_path / "arm.usdc"))
+    points = next(UsdGeom.Mesh(p) for p in stage.Traverse() if p.IsA(UsdGeom.Mesh)).GetPointsAttr()
+    points.Set([p * 1.01 for p in points.Get()])
+    stage.Export(str(tmp_path / "edited.usdc"))
+    found = read_rig(tmp_path / "edited.usdc")
+    assert found.correctives is None
+    assert "not the one" in found.notes[0]
+    assert len(found.rig.shapes.names) == 1 + len(corrective_shapes(item).shapes)
+    for attribute, value in (
+        ("filoplume:said", "{"), ("filoplume:layer0:deltas", [1.0]), ("filoplume:layer0:vertices", [1 << 30]),
+    ):
+        stage = Usd.Stage.Open(str(tmp_path / "arm.usdc"))
+        stage.GetPrimAtPath("/Model/Corrections").GetAttribute(attribute).Set(value)
+        stage.GetRootLayer().Export(str(tmp_path / "bad.usdc"))
+        found = read_rig(tmp_path / "bad.usdc")
+        assert found.correctives is None, attribute
+        assert found.notes
 
 
 def test_usd_bakes_the_same_points_itself(item, tmp_path):
