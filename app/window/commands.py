@@ -201,11 +201,16 @@ class Commands:
 
 def _scores(word: str, haystack: list[tuple[str, str]]) -> list[float]:
     """How well one typed word fits each label and its further words, 0 .. 130; from 70 on it fits."""
-    # a short word is found inside any text by chance
-    rough = process.cdist([word], [" ".join(texts) for texts in haystack], scorer=fuzz.partial_ratio)[0] - 15.0
+    fits = [max(_fit(word, label), 0.75 * _fit(word, others)) for label, others in haystack]
+    if len(word) <= 4:  # a short word is found inside any text by chance
+        return fits
+    texts = [" ".join(both) for both in haystack]
+    within = process.cdist([word], texts, scorer=fuzz.partial_ratio)[0] - 15.0
+    known = sorted({known for text in texts for known in text.split()})
+    alike = dict(zip(known, process.cdist([word], known, scorer=fuzz.ratio)[0] - 9.0, strict=True))
     return [
-        max(_fit(word, label), 0.75 * _fit(word, others), float(likely) if len(word) > 4 else 0.0)
-        for (label, others), likely in zip(haystack, rough, strict=True)
+        max(fit, float(inside), *(float(alike[known]) for known in text.split()))
+        for fit, inside, text in zip(fits, within, texts, strict=True)
     ]
 
 

@@ -332,15 +332,21 @@ class MainWindow(QMainWindow):
         editor.show()
 
     def show_console(self) -> None:
-        """Python at the bottom of the window, or away with it."""
+        """Python at the bottom of the window, ready to type in, or away with it."""
+        opens = self._console is None or not self._console.isVisible()
         if self._console is None:
             self._console = QDockWidget("Python", self)
             self._console.setObjectName("console")
             self._console.setWidget(Console(self.desk))
             self.addDockWidget(Qt.DockWidgetArea.BottomDockWidgetArea, self._console)
             self.resizeDocks([self._console], [self.height() // 4], Qt.Orientation.Vertical)
-            return
-        self._console.setVisible(not self._console.isVisible())
+        else:
+            self._console.setVisible(opens)
+        if opens:
+            self.activateWindow()  # the view is a window of its own, whose hotkeys the letters would be
+            self._console.widget().setFocus()
+        else:
+            self.viewport.requestActivate()
 
     def change_settings(self, **changes: Any) -> None:
         """Take other preferences at once, and keep them."""

@@ -16,6 +16,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QKeyEvent, QPainter
 from PySide6.QtWidgets import (
     QFrame,
+    QLabel,
     QLineEdit,
     QListView,
     QStyle,
@@ -60,6 +61,12 @@ class Palette(QFrame):
         self.model = FoundCommands(commands, keymap)
         self.list.setModel(self.model)
         self.list.setItemDelegate(_Row(self.list))
+        self.nothing = QLabel("No command fits these words. Try fewer, or others for the same thing.")
+        self.nothing.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        self.nothing.setWordWrap(True)
+        inside = QVBoxLayout(self.list)
+        inside.addWidget(self.nothing)
+        inside.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
         layout.setSpacing(8)
@@ -85,6 +92,7 @@ class Palette(QFrame):
     def look_up(self, words: str) -> None:
         """List the commands that fit the words, best first."""
         self.model.find(words)
+        self.nothing.setVisible(not self.model.rowCount())
         if self.model.rowCount():
             self.list.setCurrentIndex(self.model.index(0))
             self.list.scrollToTop()

@@ -273,8 +273,8 @@ def test_theme_and_text(host: Host) -> None:
     ("import", "file.import_mesh"), ("screenshot", "file.screenshot"), ("wireframe", "view.wire"),
     ("both sides", "tool.symmetry"), ("mirror", "groom.mirror"), ("bigger brush", "tool.larger"),
     ("hotkey", "window.keymap"), ("record", "macro.record"),
-    ("prefrences", "window.preferences"), ("symetry", "tool.symmetry"), ("view top", "view.top"),
-    ("pyth", "window.console"), ("comb", "tool.comb"),
+    ("prefrences", "window.preferences"), ("symetry", "tool.symmetry"), ("simetry", "tool.symmetry"),
+    ("view top", "view.top"), ("pyth", "window.console"), ("comb", "tool.comb"),
 ])
 def test_words_find_their_command_first(host: Host, words: str, name: str) -> None:
     assert host.commands.find(words)[0].name == name

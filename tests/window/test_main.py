@@ -59,12 +59,16 @@ def test_the_title_and_the_top_say_whether_work_is_saved(hand: Hand, tmp_path: P
     assert load_settings().settings.recent == (str(tmp_path / "mine.filo"),)
 
 
-def test_the_console_leaves_the_view_its_room(hand: Hand) -> None:
+def test_the_console_leaves_the_view_its_room_and_takes_the_keys_while_it_is_there(hand: Hand) -> None:
     window = hand.window
     window.show_console()
     hand.until(lambda: 0 < window._console.height() <= 0.27 * window.height())
     hand.rest()
     assert window._console.height() <= 0.27 * window.height()
+    typed_in = window._console.widget().input
+    hand.until(lambda: window._console.isVisible() and typed_in.hasFocus())
+    window.show_console()
+    hand.until(lambda: not window._console.isVisible() and window.viewport.isActive() and not typed_in.hasFocus())
 
 
 def test_closing_keeps_unsaved_work_for_the_next_start(opened: Opened, animal: Document) -> None:

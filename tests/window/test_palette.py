@@ -59,6 +59,7 @@ def test_what_cannot_run_stays_and_says_why(palette: Palette, host: Host, qtbot:
 def test_nothing_found_runs_nothing_and_esc_leaves(palette: Palette, host: Host, qtbot: QtBot) -> None:
     qtbot.keyClicks(palette.line, "xqzwvk")
     assert palette.model.rowCount() == 0
+    assert palette.nothing.isVisible()
     qtbot.keyClick(palette.line, Qt.Key.Key_Down)
     qtbot.keyClick(palette.line, Qt.Key.Key_Return)
     qtbot.keyClick(palette.line, Qt.Key.Key_Escape)
