@@ -16,12 +16,12 @@ from core.overlay import Label, Overlay, Polyline
 from core.workspace import ViewOptions
 from viewport.kept import same
 from viewport.legend import Legend, LegendDrawing
-from viewport.overlay_drawing import labels, marks
+from viewport.overlay_drawing import LETTER, labels, marks
 from viewport.scene import Scene
 from viewport.shaders import program, set_uniforms
 from viewport.view import TEXT_PIXELS, HudLine, View3D
 
-NAME_X, NAME_Y = 18.0, 28.0  # pixels from the upper left corner of a pane to the foot of its name
+NAME_X, NAME_Y = 26.0, 28.0  # pixels from the upper right corner of a pane to the foot of its name
 
 
 class Pane(NamedTuple):
@@ -152,7 +152,8 @@ class Panes:
         """Marks, the name and the legend over a pane; the viewport is there."""
         pane, view, size = self.shown[number], self.view, self.size
         if pane.name:
-            name = Label(NAME_X * ratio, NAME_Y * ratio, pane.name, "accent", plate=True)
+            left = size[0] - (NAME_X + LETTER * len(pane.name)) * ratio
+            name = Label(max(left, 0.0), NAME_Y * ratio, pane.name, "accent", plate=True)
             overlays = (*overlays, name)
         if overlays:
             view.marks.draw(marks(overlays, view.tones, ratio), size, ratio)

@@ -14,6 +14,8 @@ from core.groom.groom import COAT_FIELDS, NAMES, Coat
 from core.record import Record
 from core.workspace import Respect, Workspace
 
+OF_GUIDES = ("hairspray", "selection")  # of what is respected: other crafts have no guides
+
 
 class _Panel(Section):
     """A section around one form that follows the desk; it is silent while a stroke goes on."""
@@ -117,7 +119,11 @@ class RespectPanel(_Panel):
         self.refresh()
 
     def refresh(self) -> None:
-        self.show_record("respect", self.desk.workspace.respect, Setting())
+        craft = self.desk.session.tool.craft
+        self.show_record(("respect", craft), self.desk.workspace.respect, Setting())
+        if self.form is not None:
+            for name in OF_GUIDES:
+                self.form.rows[name].setVisible(craft == "groom")
 
     def edited(self, record: Respect, final: bool) -> None:
         self.desk.set_workspace(respect=record)

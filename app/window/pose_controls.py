@@ -10,10 +10,11 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 from app.window.choice_bar import ChoiceBar
 from app.window.desk import Desk
 from app.window.number_bar import NumberBar
+from app.window.pose_pad import DialPad
 from app.window.sections import Row
 from core.document import Document, MeshObject
 from core.field import Field
-from core.pose.pose import REST, Pose
+from core.pose.pose import REST, Pose, moved_controls
 from core.pose.rig import Control, Rig
 from core.pose.rotation import euler_from_quaternion, quaternion_from_euler
 from core.pose.synthesis import pose_at
@@ -37,6 +38,7 @@ class PoseControls(QWidget):
         self.mesh, self.joint = ChoiceBar(_MESH, "", None, ("",)), ChoiceBar(_JOINT, "", None, ("",))
         self.angles = tuple(NumberBar(known, 0.0, 0.0) for known in _ANGLES)
         self.dials: dict[str, NumberBar] = {}
+        self.pad: DialPad | None = None
         self._about: tuple[object, ...] = ()
         self._held: tuple[str, Pose, np.ndarray] | None = None  # joint, its pose, and angles the hand set
         column = QVBoxLayout(self)
@@ -120,9 +122,12 @@ class PoseControls(QWidget):
         if self.joint.value() not in names and names:
             self.joint.set_value(_first_joint(item, rig))
         self._clear_dials()
-        for control in rig.controls:
-            if control.kind != "number":
-                continue
+        dials = [control for control in rig.controls if control.kind == "number"]
+        if len(dials) == 2:
+            self.pad = DialPad(dials[0], dials[1])
+            self.pad.moved.connect(self._padded)
+            self._dial_rows.addWidget(self.pad)
+        for control in dials:
             bar = self.dials[control.name] = NumberBar(_dial(control), control.rest, control.rest)
             bar.edited.connect(lambda value, final, name=control.name: self._dialled(name, value, final))
             self._dial_rows.addWidget(Row(control.name, bar))
@@ -133,7 +138,7 @@ class PoseControls(QWidget):
             if widget is not None:
                 widget.hide()
                 widget.deleteLater()
-        self.dials = {}
+        self.dials, self.pad = {}, None
 
     def _show(self, rig: Rig) -> None:
         pose, joint = self.pose(), self.joint.value()
@@ -153,6 +158,21 @@ class PoseControls(QWidget):
         rests = {control.name: control.rest for control in rig.controls}
         for name, dial in self.dials.items():
             dial.set_value(float(pose.numbers.get(name, rests[name])))
+        if self.pad is not None and not self.pad.dragging:
+            self.pad.show_pose(pose, self._on_pad())
+
+    def _on_pad(self) -> tuple[Pose, ...]:
+        """The sculpts that only the two dials of the pad are about."""
+        item = self.desk.posed
+        layers = () if item is None or item.correctives is None else item.correctives.layers
+        return tuple(s.pose for layer in layers for s in layer.space.samples
+                     if set(moved_controls(s.pose)) <= self.dials.keys())
+
+    def _padded(self, x: float, y: float, final: bool) -> None:
+        pad, pose = self.pad, self.pose()
+        if pad is not None:
+            numbers = {**pose.numbers, pad.across.name: x, pad.up.name: y}
+            self.hold(pose.replace(name="held", numbers=numbers), final)
 
     def _turned(self, final: bool) -> None:
         joint, pose = self.joint.value(), self.pose()

@@ -21,20 +21,26 @@ from PySide6.QtWidgets import (
 from app.window.choice_bar import ChoiceBar
 from app.window.desk import Desk
 from app.window.number_bar import NumberBar
+from app.window.params_panel import RecordForm
+from app.window.pose_views import ONLY_SKIN
 from app.window.sections import Row
 from app.window.theme import look_of
 from core.document import Document
 from core.errors import UserError
-from core.field import Field
-from core.pose.compare import LABELS
+from core.field import Field, fields_of
+from core.pose.compare import LABELS, METHODS, Method
 from core.pose.pose import REST, Pose
-from core.pose.pose_space import Dof, PoseLayer, PoseSample, Way
+from core.pose.pose_space import Dof, PoseLayer, PoseSample, PoseSpace
 from core.pose.synthesis import pose_at
 from core.workspace import Workspace
 from tools import pose_edits
+from tools.pose_compare import set_method
 
-WAYS: tuple[Way, ...] = get_args(Way)
-_WAY = Field("Method", "How sculpts are interpolated: by the pose space, or by plainer methods to compare it with.")
+_WAY = Field("Method", "How sculpts are interpolated: by the pose space, or by others to compare it with; "
+             "Skin only just looks at the skin without them.")
+_READS = Field("Reads", "What of this joint the layer reads: where it points (swing), its turn about itself (twist), "
+               "or the turn about one axis.")
+READINGS: tuple[pose_edits.Reading, ...] = get_args(pose_edits.Reading)
 _ROLE = Qt.ItemDataRole.UserRole
 
 
@@ -64,8 +70,10 @@ class PoseList(QWidget):
         super().__init__(parent)
         self.desk = desk
         self.list = _Names("Sculpted poses")
-        self.way = ChoiceBar(_WAY, "pose-space", "pose-space", WAYS, tuple(LABELS[way] for way in WAYS))
+        self.way = ChoiceBar(_WAY, "pose-space", "pose-space", METHODS, tuple(LABELS[way] for way in METHODS))
         self.falloffs: dict[str, NumberBar] = {}
+        self.settings: RecordForm | None = None  # of the layer that is chosen
+        self.readings: dict[str, ChoiceBar] = {}
         self.said = QLabel()
         self.said.setWordWrap(True)
         self.said.setEnabled(False)
@@ -111,15 +119,23 @@ class PoseList(QWidget):
         """Names of the poses that are chosen in the list."""
         return [item.data(0, _ROLE) for item in self.list.selectedItems() if item.parent() is not None]
 
+    @property
+    def chosen_layer(self) -> str | None:
+        """Name of the layer that alone is chosen in the list."""
+        rows = self.list.selectedItems()
+        return rows[0].data(0, _ROLE) if len(rows) == 1 and rows[0].parent() is None else None
+
     def refresh(self) -> None:
         """Show what is on the desk now."""
         item = self.desk.posed
         layers: tuple[PoseLayer, ...] = () if item is None or item.correctives is None else item.correctives.layers
+        if layers:
+            self.way.set_value(self._method(layers[0]))
         seen = None if item is None else (item.id, item.correctives)
         if self.desk.session.stroking or (seen is not None and seen == self._seen):
             return
         self._seen = seen
-        kept = self.chosen
+        kept, layer_kept = self.chosen, self.chosen_layer
         self._filling = True
         self.list.clear()
         for layer in layers:
@@ -127,8 +143,10 @@ class PoseList(QWidget):
             top.setData(0, _ROLE, layer.name)
             top.setFlags(top.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             top.setCheckState(0, Qt.CheckState.Checked if layer.enabled else Qt.CheckState.Unchecked)
-            top.setToolTip(0, f"Layer {layer.name}: the box switches its corrections on and off.")
+            top.setToolTip(0, f"Layer {layer.name}: the box switches its corrections on and off; a click shows its "
+                           "kernel and what else it is set to.")
             self.list.addTopLevelItem(top)
+            top.setSelected(layer.name == layer_kept)
             for sample in layer.space.samples:
                 one = QTreeWidgetItem(top, [sample.name])
                 one.setData(0, _ROLE, sample.name)
@@ -141,8 +159,6 @@ class PoseList(QWidget):
         self.said.setVisible(not layers)
         self.said.setText("No sculpts yet. Pose the rig, then sculpt with a brush or add the pose as it looks."
                           if item is not None else "No rig yet. Open a USD, glTF or project file with joints.")
-        if layers:
-            self.way.set_value(layers[0].kind)
         self.list.updateGeometry()
         self._selected()
 
@@ -169,7 +185,9 @@ class PoseList(QWidget):
             if widget is not None:
                 widget.hide()
                 widget.deleteLater()
-        self.falloffs, chosen = {}, self.chosen
+        self.falloffs, self.settings, self.readings, chosen = {}, None, {}, self.chosen
+        if self.chosen_layer is not None:
+            self._show_layer(self.chosen_layer)
         found = self._sample(chosen[0]) if len(chosen) == 1 else None
         for dof in () if found is None else found[0].space.dofs:
             assert found is not None
@@ -182,6 +200,30 @@ class PoseList(QWidget):
         self.buttons["add"].setEnabled(item is not None)
         for name, enough in (("move", len(chosen) == 1), ("merge", len(chosen) > 1), ("delete", bool(chosen))):
             self.buttons[name].setEnabled(enough)
+
+    def _show_layer(self, name: str) -> None:
+        """What a layer is set to, below the list."""
+        item = self.desk.posed
+        layers = () if item is None or item.correctives is None else item.correctives.layers
+        layer = next((one for one in layers if one.name == name), None)
+        if layer is None or item is None or item.rig is None:
+            return
+        self.settings = RecordForm(layer.space)
+        self.settings.changed.connect(lambda space, final: final and self._set_layer(layer, space))
+        self._reach.addWidget(self.settings)
+        for dof in layer.space.dofs:
+            if dof.control in item.rig.skeleton.names and dof.kind != "translation":
+                bar = self.readings[dof.control] = ChoiceBar(_READS, dof.kind, None, READINGS, READINGS)
+                bar.edited.connect(lambda value, final, dof=dof: final and self._edit(
+                    "Reading", pose_edits.set_reading, name, dof.control, value))
+                self._reach.addWidget(Row(f"Reads {dof.control}", bar))
+
+    def _set_layer(self, layer: PoseLayer, space: PoseSpace) -> None:
+        """Take what the hand made of the settings of a layer."""
+        changes = {field: getattr(space, field) for field in fields_of(PoseSpace)
+                   if getattr(space, field) != getattr(layer.space, field)}
+        if changes:
+            self._edit("Layer settings", pose_edits.set_space, layer.name, **changes)
 
     def _reached(self, dof: Dof, value: float) -> None:
         if len(self.chosen) == 1:
@@ -210,14 +252,29 @@ class PoseList(QWidget):
         for name in self.chosen:
             self._edit("Delete pose", pose_edits.remove_pose, name)
 
-    def _way_chosen(self, way: Way, final: bool) -> None:
-        if final:
-            self._edit("Method", pose_edits.set_way, way)
+    def _method(self, layer: PoseLayer) -> Method:
+        """By which method the sculpts are taken, or shown."""
+        if self.desk.workspace.view.compare == ONLY_SKIN:
+            return "skin"
+        return "weighted" if layer.kind == "pose-space" and layer.space.weighted else layer.kind
 
-    def _edit(self, step: str, function: Callable[..., Document], *args: object) -> None:
+    def _way_chosen(self, way: Method, final: bool) -> None:
+        if not final:
+            return
+        view = self.desk.workspace.view
+        if way == "skin":
+            self.desk.set_workspace(view=view.replace(compare=ONLY_SKIN))
+            return
+        if view.compare == ONLY_SKIN:
+            self.desk.set_workspace(view=view.replace(compare=()))
+        item = self.desk.posed
+        if item is not None and item.correctives is not None and self._method(item.correctives.layers[0]) != way:
+            self._edit("Method", set_method, way)
+
+    def _edit(self, step: str, function: Callable[..., Document], *args: object, **parameters: object) -> None:
         item = self.desk.posed
         if item is not None:
-            self.desk.edit(step, function, item.id, *args)
+            self.desk.edit(step, function, item.id, *args, **parameters)
             self._seen = None  # what was refused goes back to what it was
             self.refresh()
 
@@ -236,7 +293,7 @@ class PoseList(QWidget):
             self.refresh()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
-        if old.mesh != new.mesh or old.craft != new.craft:
+        if old.mesh != new.mesh or old.craft != new.craft or old.view.compare != new.view.compare:
             self.refresh()
 
 

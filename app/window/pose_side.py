@@ -12,21 +12,25 @@ from app.window.desk import Desk
 from app.window.pose_graph import Graph, Line
 from app.window.pose_look import PoseLook
 from app.window.pose_map_panel import PoseMap
+from app.window.pose_talk import TalkTable
 from app.window.sections import Row
 from app.window.theme import look_of
 from core.document import Document, MeshObject
 from core.errors import UserError
 from core.field import Field
+from core.pose.edit_layers import cross_talk
 from core.pose.pose import REST, Pose
 from core.pose.pose_path import Motion, clip_weights, most_moved, walk
 from core.pose.pose_space import PoseSample
 from core.workspace import Workspace
+from tools.pose_edits import hold_pose
 
 LOW = 480  # pixels of height below which the map stands alone
 NARROW = 760  # pixels of the middle below which map and model stand one over the other
 MOST_FRAMES = 240  # of the graph of a clip
-CLIP, WALK = "clip", "walk"
-_GRAPH = Field("Graph", "What is plotted: weights of sculpts over the clip, or how a point moves on a way.")
+CLIP, WALK, TALK = "clip", "walk", "talk"
+_GRAPH = Field("Graph", "What is plotted: weights of sculpts over the clip, how a point moves on a way, or who "
+               "disturbs whom among the sculpts.")
 _FROM = Field("From", "Where the way through pose space begins: at rest or at a sculpt.")
 _TO = Field("To", "Where the way ends: the surface point this sculpt moves most is followed.")
 
@@ -41,7 +45,10 @@ class PoseSide(QWidget):
         self.look = PoseLook(desk)
         self.map = PoseMap(desk)
         self.graph = Graph()
-        self.kind = ChoiceBar(_GRAPH, CLIP, CLIP, (CLIP, WALK), ("weights over the clip", "walk to a pose"))
+        self.kind = ChoiceBar(
+            _GRAPH, CLIP, CLIP, (CLIP, WALK, TALK), ("weights over the clip", "walk to a pose", "cross-talk"))
+        self.talk = TalkTable()
+        self.talk.picked.connect(self._picked)
         self.start, self.end = ChoiceBar(_FROM, "rest", "rest", ("rest",)), ChoiceBar(_TO, "", None, ("",))
         self.ways = [Row(_FROM.label, self.start), Row(_TO.label, self.end)]
         below = self._below = QWidget()
@@ -51,6 +58,7 @@ class PoseSide(QWidget):
         for row in (Row(_GRAPH.label, self.kind), *self.ways):
             column.addWidget(row)
         column.addWidget(self.graph, 1)
+        column.addWidget(self.talk, 1)
         self.parts = QSplitter(Qt.Orientation.Vertical)
         self.parts.setChildrenCollapsible(False)
         self.parts.setHandleWidth(look_of().grid)
@@ -90,12 +98,15 @@ class PoseSide(QWidget):
         item = self.desk.posed
         if self.desk.session.stroking or not self.isVisible() or self._below.isHidden():
             return
-        samples = _samples(item)
+        samples, talks = _samples(item), self.kind.value() == TALK
+        self.talk.setVisible(talks)
+        self.graph.setVisible(not talks)
         for row in self.ways:
             row.setVisible(self.kind.value() == WALK and bool(samples))
         if item is None or item.rig is None or not samples or item.correctives is None:
             self._seen = ()
             self.graph.show_words("Sculpts have weights to plot here once there are some.")
+            self.talk.show_words("Once there are sculpts, this table says which is felt at the poses of others.")
             return
         names = ["rest", *(s.name for s in samples)]
         self.start.set_choices(tuple(names), tuple(names))
@@ -109,10 +120,35 @@ class PoseSide(QWidget):
                                                 for a, b in zip(seen, self._seen, strict=True)):
             return
         self._seen = seen
-        if self.kind.value() == CLIP:
+        if talks:
+            self._tabulate(item, seen)
+        elif self.kind.value() == CLIP:
             self._plot_clip(item, seen)
         else:
             self._plot_walk(item, {s.name: s.pose for s in samples}, seen)
+
+    def _tabulate(self, item: MeshObject, seen: tuple[object, ...]) -> None:
+        rig, correctives, points = item.rig, item.correctives, item.mesh.points
+        assert rig is not None
+        assert correctives is not None
+
+        def done(found: tuple[tuple[str, ...], np.ndarray]) -> None:
+            if self._seen is seen:
+                self.talk.show_table(*found)
+
+        def failed(error: Exception) -> None:
+            self.talk.show_words(str(error) if isinstance(error, UserError) else "The table could not be made.")
+
+        self.desk.jobs.start(
+            "Looking who disturbs whom", lambda progress, cancelled: cross_talk(points, rig, correctives), done,
+            failed, self)
+
+    def _picked(self, name: str) -> None:
+        """Hold the pose of a row of the table."""
+        item = self.desk.posed
+        pose = next((s.pose for s in _samples(item) if s.name == name), None)
+        if item is not None and pose is not None:
+            self.desk.edit("Pose", hold_pose, item.id, pose)
 
     def _plot_clip(self, item: MeshObject, seen: tuple[object, ...]) -> None:
         rig, correctives, points = item.rig, item.correctives, item.mesh.points

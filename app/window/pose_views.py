@@ -45,6 +45,7 @@ from viewport.scene import Scene, Surface
 
 Result = TypeVar("Result")
 MANY = 20_000  # vertices: fields of larger meshes are computed on a worker
+ONLY_SKIN: tuple[Method, ...] = ("skin",)  # looked at alone
 # methods side by side, as they are offered
 SIDES: dict[str, tuple[Method, ...]] = {
     "off": (), "SSD · PSD": ("skin", "pose-space"), "SI · PSD": ("interpolation", "pose-space"),
@@ -75,12 +76,11 @@ class PoseViews(QObject):
 
     @property
     def methods(self) -> tuple[Method, ...]:
-        """The methods side by side; none for the usual view."""
+        """The methods side by side, or the one that is looked at; none for the usual view."""
         item = self.desk.posed
         if self.desk.session.tool.craft != "pose" or item is None or item.hidden:
             return ()
-        known = tuple(m for m in METHODS if m in self.desk.workspace.view.compare)
-        return known if len(known) > 1 else ()
+        return tuple(m for m in METHODS if m in self.desk.workspace.view.compare)
 
     @property
     def heat(self) -> View | None:

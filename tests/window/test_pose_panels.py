@@ -17,6 +17,7 @@ from core.demo.pose_document import pose_document
 from core.document import Document
 from core.overlay import Circle
 from core.pose.compare import LABELS
+from core.pose.edit_layers import cross_talk
 from core.pose.pose import REST
 from core.pose.rotation import quaternion_from_euler
 from core.pose.synthesis import evaluate
@@ -179,7 +180,7 @@ def test_map_and_model_stand_over_one_another_in_a_narrow_window(posing: Hand) -
     assert window.viewport.width() > 300
 
 
-def test_colours_of_the_surface_follow_the_pose_and_say_what_they_mean(posing: Hand) -> None:
+def colours_of_the_surface_follow_the_pose_and_say_what_they_mean(posing: Hand) -> None:
     window = posing.window
     desk, picture = window.desk, window.viewport.picture
     window.pose_side.look.heat.enter("shape")
@@ -187,29 +188,29 @@ def test_colours_of_the_surface_follow_the_pose_and_say_what_they_mean(posing: H
     at_rest = picture_values(posing)
     assert np.ptp(at_rest) == pytest.approx(0.0, abs=1e-6)
     desk.edit("Pose", hold_pose, desk.posed.id, desk.posed.correctives.layers[0].space.samples[0].pose)
-    posing.rest()
+    drawn(posing)
     assert np.ptp(picture_values(posing)) > 0.2
     legend = picture.panes.shown[0].legend
     assert legend.signed
     assert legend.ticks[2].endswith("m")
     window.commands.run("view.heat_error")
-    posing.rest()
+    drawn(posing)
     assert picture.panes.shown[0].legend.title.startswith("Error")
     window.commands.run("view.heat_plain")
-    posing.rest()
+    drawn(posing)
     assert picture.panes.shown[0].scene.surfaces[0].values is None
     desk.choose("mask")
-    posing.rest()
+    drawn(posing)
     assert picture.panes.shown[0].legend.title == "Mask"
 
 
-def test_methods_stand_side_by_side_and_the_hand_works_in_any_of_them(posing: Hand) -> None:
+def methods_stand_side_by_side_and_the_hand_works_in_any_of_them(posing: Hand) -> None:
     window = posing.window
     desk, view = window.desk, window.viewport
     whole = view.pixels()
     desk.edit("Pose", hold_pose, desk.posed.id, desk.posed.correctives.layers[0].space.samples[0].pose)
     window.pose_side.look.sides.enter("SSD · SI · PSD · WPSD")
-    posing.rest()
+    drawn(posing)
     panes = view.picture.panes.shown
     assert [pane.name for pane in panes] == [LABELS[m] for m in ("skin", "interpolation", "pose-space", "weighted")]
     skin, _, psd, _ = (pane.scene.surfaces[0].points for pane in panes)
@@ -225,15 +226,114 @@ def test_methods_stand_side_by_side_and_the_hand_works_in_any_of_them(posing: Ha
     place = (ring.x + size[0] + 0.5) / whole[0], (ring.y + size[1] + 0.5) / whole[1]  # in the last pane
     posing.press(place)
     posing.release(place)
-    posing.rest()
+    drawn(posing)
     assert desk.posed.joint_selection == ("elbow",)
     window.commands.run("view.single")
-    posing.rest()
+    drawn(posing)
     assert view.pixels() == whole
 
 
+def two_dials_have_a_pad_whose_dots_are_the_sculpts(posing: Hand) -> None:
+    window = posing.window
+    desk, controls = window.desk, part(posing, PoseControls)
+    assert controls.pad is None
+    desk.set_workspace(mesh=desk.document.meshes[1].id)
+    pad = controls.pad
+    joy = next(pose for pose in pad.poses if pose.name == "joy")
+    assert {pose.name for pose in pad.poses} == {"joy", "anger", "sadness", "calm"}
+    steps = len(desk.session.history.names)
+    start, end = pad.to_pixel(*pad.at).toPoint(), pad.to_pixel(0.5, -0.25).toPoint()
+    QTest.mousePress(pad, LEFT, pos=start)
+    QTest.mouseMove(pad, (start + end) / 2)
+    QTest.mouseMove(pad, end)
+    held = desk.posed.pose.numbers
+    assert held["valence"] == pytest.approx(0.5, abs=0.02)
+    assert held["arousal"] == pytest.approx(-0.25, abs=0.02)
+    QTest.mouseRelease(pad, LEFT, pos=end)
+    assert len(desk.session.history.names) == steps + 1
+    assert controls.dials["valence"].value() == pytest.approx(held["valence"])
+    QTest.mouseClick(pad, LEFT, pos=pad.to_pixel(joy.numbers["valence"], joy.numbers["arousal"]).toPoint())
+    assert desk.posed.pose.numbers == joy.numbers
+
+
+def a_chosen_layer_shows_what_it_is_set_to_and_takes_another_kernel(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    poses.list.clearSelection()
+    poses.list.setCurrentItem(poses.list.topLevelItem(0))
+    name = poses.chosen_layer
+    assert {"kernel", "affine", "normalise", "clamp", "smoothing", "table", "weighted"} <= poses.settings.fields.keys()
+    poses.settings.fields["kernel"].enter("wendland")
+    layer = desk.posed.correctives.layers[0]
+    assert (layer.name, layer.space.kernel) == (name, "wendland")
+    assert poses.chosen_layer == name
+    poses.readings["elbow"].enter("swing")
+    assert [dof.kind for dof in desk.posed.correctives.layers[0].space.dofs] == ["swing"]
+    desk.session.undo()
+    desk.session.undo()
+    assert desk.posed.correctives.layers[0].space.kernel == "gaussian"
+
+
+def skin_only_is_looked_at_and_weighted_is_a_step(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    before = desk.posed.correctives
+    poses.way.enter("skin")
+    drawn(posing)
+    assert desk.posed.correctives is before
+    assert posing.window.viewport.picture.panes.shown[0].name == LABELS["skin"]
+    poses.way.enter("weighted")
+    drawn(posing)
+    assert all(layer.space.weighted for layer in desk.posed.correctives.layers)
+    assert desk.session.history.names[-1] == "Method"
+    assert posing.window.viewport.picture.panes.shown[0].name == ""
+    assert poses.way.value() == "weighted"
+
+
+def cross_talk_is_a_table_whose_rows_hold_their_poses(posing: Hand) -> None:
+    desk, side = posing.window.desk, posing.window.pose_side
+    side.kind.enter("talk")
+    drawn(posing)
+    item = desk.posed
+    names, known = cross_talk(item.mesh.points, item.rig, item.correctives)
+    assert side.talk.names == names
+    assert np.array_equal(side.talk.table, known)
+    QTest.mouseClick(side.talk, LEFT, pos=side.talk.cell(1, -1).center().toPoint())
+    held = desk.posed.pose
+    assert held.name == names[1]
+    side.talk.show_table(("bent", "raised"), np.array([[0.0, 0.0023], [0.0, 0.0]]))
+    assert "bent the sculpt raised moves the surface by 2.3 mm" in side.talk.said(0, 1)
+    assert "silent" in side.talk.said(1, 0)
+
+
+def respect_says_only_what_concerns_posing(posing: Hand) -> None:
+    panel = posing.window.panels["respect"]
+    shown = {name for name, row in panel.form.rows.items() if not row.isHidden()}
+    assert shown == {"symmetry"}
+    posing.window.desk.set_craft("groom")
+    assert {name for name, row in panel.form.rows.items() if not row.isHidden()} == {
+        "hairspray", "selection", "symmetry"}
+
+
+def test_what_the_view_shows_and_what_stands_beside_it(posing: Hand) -> None:
+    """In one window, for opening one takes longer than all of these."""
+    for follows in (
+        colours_of_the_surface_follow_the_pose_and_say_what_they_mean,
+        methods_stand_side_by_side_and_the_hand_works_in_any_of_them,
+        a_chosen_layer_shows_what_it_is_set_to_and_takes_another_kernel,
+        skin_only_is_looked_at_and_weighted_is_a_step,
+        cross_talk_is_a_table_whose_rows_hold_their_poses,
+        two_dials_have_a_pad_whose_dots_are_the_sculpts,
+        respect_says_only_what_concerns_posing,
+    ):
+        follows(posing)
+
+
 def picture_values(hand: Hand) -> np.ndarray:
-    hand.rest()
+    drawn(hand)
     values = hand.window.viewport.picture.panes.shown[0].scene.surfaces[0].values
     assert values is not None
     return values
+
+
+def drawn(hand: Hand) -> None:
+    """Wait until jobs have ended and what they caused is on the screen; nothing needs to be finished for that."""
+    hand.until(lambda: not hand.window.desk.jobs.running and not hand.view.pending)
