@@ -86,6 +86,7 @@ class Hand:
         self._pen = Pen(self.pen)
         (first,) = self._pen.filtered((pointer,))
         self._bare = not craft.ready(tool, grounds[0])  # asked first: what gets ready meanwhile, begin may have missed
+        grounds = tuple(ground.begun(first) for ground in grounds)
         self._strokes = [(tool.begin(ground, first), ground) for ground in grounds]
         self._tool, self._matter = tool, craft.matter(tool, grounds[0])
         self._batches = []

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,10 @@ class Ground:
     def hit(self, pointer: Pointer) -> Hit | None:
         """Where the pointer meets a skin; None beside it, or where a craft has none."""
         return None
+
+    def begun(self, pointer: Pointer) -> Self:
+        """The ground of a stroke that begins at a pointer, where that makes a difference."""
+        return self
 
     def opposite(self, hit: Hit) -> NDArray[np.float64]:
         """The point (3,) on the other side of symmetry."""

@@ -1,5 +1,6 @@
 """The hand: what a press, a drag, a release, Esc, an error and a pose make of a document."""
 
+import itertools
 import time
 
 import numpy as np
@@ -474,3 +475,60 @@ def test_what_gets_ready_between_the_press_and_its_first_sample_is_no_stumbling_
         return guides_of(s).points
 
     np.testing.assert_array_equal(stroked(True), stroked(False))
+
+
+def bent_tops(name: str, direction: tuple[float, float, float]):
+    """A session at the frame where the upper half is turned aside as a whole, and pixels of that half on one side."""
+    s = session(workspace=Workspace(frame=BENT, respect=Respect(symmetry=True)))
+    eye = sight(direction)
+    s.choose(name, size=60.0 if name == "cut" else 30.0)
+    ground = s.hand._grounds(eye, s.tool)[0]
+    tops = np.flatnonzero(ground.rest.points[:, 1] > 0.75)
+    aside = ground.rest.points[tops, 0]
+    return s, eye, [ground.view.pixels(ground.skin.points[tops[np.argmin(np.abs(aside - x))]].astype(np.float64))[0]
+                    for x in (0.35, 0.15)]
+
+
+@pytest.mark.parametrize("name", ["comb", "length", "hairspray", "cut"])
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_turned_head_is_mirrored_by_its_own_sides(name, beside):
+    """What the hand does to one cheek happens to the other one, wherever that has gone."""
+    s, eye, (one, other) = bent_tops(name, (0.0, -0.2, -1.0) if beside else (-0.3, -0.9, -0.5))
+    start = guides_of(s)
+    places = [one, other]
+    if beside:
+        ground = s.hand._grounds(eye, s.tool)[0]
+        pixels = ground.view.pixels(ground.skin.points.astype(np.float64))[0]
+        places.insert(0, pixels[np.argmin(pixels[:, 1])] - [0.0, 25.0])
+    s.hand.stroke(eye, tuple(p for a, b in itertools.pairwise(places) for p in line(a, b)))
+    after = guides_of(s)
+    top = (after.points[:, 0, 1] > 0.6) & (np.abs(after.points[:, 0, 0]) > 0.08)
+    was, mine = take_rows(start, top), take_rows(after, top)
+    changed = (mine.points != was.points).any(axis=(1, 2)) | (mine.hold != was.hold).any(axis=1)
+    left, right = (changed & (side * mine.points[:, 0, 0] > 0) for side in (1, -1))
+    assert left.sum() == right.sum() > 0
+    assert asymmetry(mine).max() < 5e-3
+    np.testing.assert_allclose(mine.hold, mine.hold[mirrored_rows(mine)], atol=1e-4)
+
+
+def test_guides_are_scattered_on_both_sides_of_a_turned_head():
+    s, eye, (one, _) = bent_tops("scatter", (-0.3, -0.9, -0.5))
+    s.hand.stroke(eye, line(one, one, 2))
+    roots = guides_of(s).points[:, 0][guides_of(s).ids >= symmetric_fur().next_id].astype(np.float64)
+    roots = roots[np.abs(roots[:, 0]) > 0.15]
+    twins = np.linalg.norm(roots[:, None] * [-1.0, 1.0, 1.0] - roots[None], axis=2).min(axis=1)
+    assert len(roots) > 6
+    assert np.median(twins) < 1e-3
+    assert abs((roots[:, 0] > 0).mean() - 0.5) < 0.2
+
+
+def test_the_ghost_of_a_turned_head_lies_on_its_other_side():
+    s, eye, (one, _) = bent_tops("comb", (-0.3, -0.9, -0.5))
+    ground = s.hand._grounds(eye, s.tool)[0]
+    hit = ground.hit(pointers([one])[0])
+    corners = ground.rest.triangles.vertices[hit.triangle]
+    twin = [int(np.argmin(np.linalg.norm(ground.rest.points - p * [-1.0, 1.0, 1.0], axis=1)))
+            for p in ground.rest.points[corners]]
+    there = hit.barycentric @ ground.skin.points[twin]
+    np.testing.assert_allclose(ground.opposite(hit), there, atol=2e-3)
+    assert np.linalg.norm(there - hit.point * [-1.0, 1.0, 1.0]) > 0.2
