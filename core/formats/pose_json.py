@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -39,6 +40,7 @@ from core.pose.synthesis import pose_at
 from core.record import freeze
 
 LARGEST_JSON = 64 << 20  # bytes
+TORN = 1e-5  # of the size of a sculpt: what sides of a seam may be apart by rounding
 Three = tuple[float, float, float]
 
 
@@ -127,7 +129,9 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
     rig = _with_controls(said.controls, rig, path.name)
     dofs = _dofs(said.reads, rig, path.name)
     picked = {dof.control: dof for dof in dofs}
-    sculpts, notes, at_rest = [], [], rests(rig)
+    sculpts: list[Sculpt] = []
+    notes: list[str] = []
+    at_rest = rests(rig)
     for item in said.poses:
         where = f"{path.name}, pose {item.name!r}"
         if item.name == REST_NAME or not 0 < len(item.name) <= 255 or not item.name.isprintable():
@@ -149,7 +153,7 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
                 raise UserError(
                     f"{where}: the falloff of {control!r} must be one number, or {FALLOFFS[kind]} for {kind}.")
             falloffs[control] = tuple(math.radians(one) for one in each) if turning else each
-        target = None if item.sculpt is None else read_sculpt(path.parent / item.sculpt, rig, where)
+        target = None if item.sculpt is None else read_sculpt(path.parent / item.sculpt, rig, where, notes.append)
         sculpts.append(Sculpt(pose, target, falloffs))
     fields = [name for name in _Poses.__struct_fields__ if name not in FURTHER]
     if not 0.0 <= said.smoothing <= 1e3 or not 0 <= said.weighted <= 64 or said.table not in (0, *range(2, 65537)):
@@ -176,10 +180,16 @@ def read_moment(path: Path, rig: Rig) -> Moment:
     return Moment(_pose("pose", said.controls, rig, path.name), rig, None)
 
 
-def read_sculpt(path: Path, rig: Rig, where: str) -> NDArray[np.float64]:
+def read_sculpt(
+    path: Path, rig: Rig, where: str, say: Callable[[str], object] | None = None
+) -> NDArray[np.float64]:
     """The surface (V, 3) of a sculpt, metres, from a file with the vertices of the rig's file in its order.
 
     Vertices that a seam had split in that file are one in the mesh; their mean is taken.
+
+    Parameters
+    ----------
+    say : called with a sentence where the sculpt has torn such a seam open.
 
     Raises
     ------
@@ -211,7 +221,12 @@ def read_sculpt(path: Path, rig: Rig, where: str) -> NDArray[np.float64]:
     total = np.stack([np.bincount(there, points[:, k], minlength=vertices) for k in range(3)], axis=1)
     if not count.all():
         raise UserError(f"{where}: the rig has vertices that its file does not have; read the rig again.")
-    return np.asarray(total / count[:, None], np.float64)
+    mean = np.asarray(total / count[:, None], np.float64)
+    apart = np.linalg.norm(points - mean[there], axis=1)
+    if say is not None and apart.max(initial=0.0) > TORN * np.linalg.norm(np.ptp(points, axis=0)):
+        say(f"{where}: the sculpt {path.name} opens seams by up to {2000.0 * apart.max():.3g} mm; they stay closed, "
+            "halfway between their sides.")
+    return mean
 
 
 def _with_controls(said: dict[str, _Control], rig: Rig, where: str) -> Rig:

@@ -83,6 +83,26 @@ def test_every_sculpt_comes_back_in_the_order_of_the_rig_file(folder):
         filoplume("info", folder / "arm.glb", "--json").stdout)["controls"])
 
 
+def test_a_sculpt_that_opens_seams_leaves_them_closed_and_is_told(folder):
+    """Every vertex of the file is pushed by itself, as no program with seams of UVs would show it."""
+    found = read_rig(folder / "arm.glb")
+    there = found.rig.file_vertices
+    points = read_points(folder / "bent.obj")
+    torn = points + np.random.default_rng(1).normal(0.0, 0.002, points.shape)
+    write_points(folder / "torn.obj", torn)
+    done = build(folder, [{**POSES[0], "sculpt": "torn.obj"}], "-o", folder / "torn.filo")
+    assert done.returncode == 0
+    assert "opens seams" in done.stderr
+    got = surface(folder, {"controls": POSES[0]["controls"]}, "torn.filo")
+    for vertex in np.flatnonzero(np.bincount(there) > 1):
+        sides = np.flatnonzero(there == vertex)
+        assert np.ptp(got[sides], axis=0).max() == 0.0
+        assert np.allclose(got[sides[0]], torn[sides].mean(axis=0), atol=1e-6)
+    alone = np.bincount(there)[there] == 1
+    assert np.abs(got[alone] - torn[alone]).max() <= 1e-6 * np.linalg.norm(np.ptp(points, axis=0))
+    assert "opens seams" not in build(folder, POSES, "-o", folder / "out.filo").stderr
+
+
 def test_euler_angles_are_degrees_about_x_then_y_then_z(folder):
     assert build(folder, [], "-o", folder / "empty.filo").returncode == 0
     got = surface(folder, {"controls": {"chest": {"rotate": [30, 40, 50]}}}, "empty.filo")
