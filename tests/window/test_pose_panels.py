@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
+from app.window import pose_map_panel
 from app.window.pose_controls import PoseControls
 from app.window.pose_list import PoseLibrary, PoseList
 from app.window.pose_overlay import skeleton_of
@@ -313,8 +314,24 @@ def respect_says_only_what_concerns_posing(posing: Hand) -> None:
         "hairspray", "selection", "symmetry"}
 
 
-def test_what_the_view_shows_and_what_stands_beside_it(posing: Hand) -> None:
+def a_map_of_many_sculpts_is_laid_out_by_a_job(hand: Hand) -> None:
+    canvas, bars = hand.window.pose_side.map.canvas, hand.window.pose_side.map
+    known = canvas.chart
+    bars.layer.enter("wrist")
+    bars.layer.enter("elbow")
+    assert canvas.chart is None
+    assert "Laying out" in canvas.words
+    drawn(hand)
+    assert np.array_equal(canvas.chart.spots, known.spots)
+    assert len(canvas.chart.rims) == len(known.rims)
+    assert canvas.dot is not None
+
+
+def test_what_the_view_shows_and_what_stands_beside_it(posing: Hand, monkeypatch: pytest.MonkeyPatch) -> None:
     """In one window, for opening one takes longer than all of these."""
+    with monkeypatch.context() as patch:
+        patch.setattr(pose_map_panel, "AT_ONCE", 0)
+        a_map_of_many_sculpts_is_laid_out_by_a_job(posing)
     for follows in (
         colours_of_the_surface_follow_the_pose_and_say_what_they_mean,
         methods_stand_side_by_side_and_the_hand_works_in_any_of_them,
