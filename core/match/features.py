@@ -9,9 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.image.mix import grey_bytes
+from core.image.mix import mean_grey
 
-WEAKEST = 1e-4  # of the strongest corner
+WORST = 0.15  # pixels: the standard deviation of its place that a corner may have at most, by the noise of the frame
+BLANK = 0.02  # of the range of grey: how far a blank border may be off the darkest or the lightest
+SMOOTH = 1.0  # pixels of the Gauss before slopes are taken
 
 
 def find_features(
@@ -31,17 +33,16 @@ def find_features(
     edge = pattern // 2 + 2
     if count < 1 or min(height, width) <= 2 * edge:
         return np.zeros((0, 2))
-    grey = grey_bytes(image)
-    strength = cv2.cornerMinEigenVal(cv2.GaussianBlur(grey, (0, 0), 1.0), max(3, pattern // 2), ksize=3)
-    allowed = np.zeros((height, width), np.bool_)
-    allowed[edge : height - edge, edge : width - edge] = True
+    grey = mean_grey(image)
+    allowed = ~cv2.dilate(_blank_border(grey).astype(np.uint8), np.ones((2 * edge + 1,) * 2, np.uint8)).astype(np.bool_)
+    allowed[:edge] = allowed[-edge:] = False
+    allowed[:, :edge] = allowed[:, -edge:] = False
     if hold is not None:
         allowed &= ~hold
+    strength, fine_grey = _strength(grey, pattern)
+    peaks = (strength == cv2.dilate(strength, np.ones((3, 3), np.uint8))) & allowed & (strength > WORST**-2)
     # as far apart as `count` points on a square grid would be, less where there are not so many
     spacing = max(pattern / 2.0, 0.7 * float(np.sqrt(height * width / count)))
-    peaks = (
-        (strength == cv2.dilate(strength, np.ones((3, 3), np.uint8))) & allowed & (strength > WEAKEST * strength.max())
-    )
     ys, xs = np.nonzero(peaks)
     order = np.argsort(-strength[ys, xs], kind="stable")[:20_000]
     candidates = np.stack((xs[order], ys[order]), axis=1).astype(np.float64)
@@ -60,7 +61,41 @@ def find_features(
     points = np.array(chosen)
     rough = np.ascontiguousarray(points, np.float32).reshape(-1, 1, 2)
     fine = cv2.cornerSubPix(
-        grey, rough.copy(), (3, 3), (-1, -1), (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 20, 0.01)
+        fine_grey, rough.copy(), (3, 3), (-1, -1), (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 20, 0.01)
     )
     fine = fine.reshape(-1, 2).astype(np.float64)
     return np.where(np.abs(fine - points) <= 1.5, fine, points)
+
+
+def _strength(grey: NDArray[np.float32], pattern: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """One over the variance in px^2 a pattern's place has in its worse direction, by slopes and noise; smoothed grey.
+
+    Shi & Tomasi's smaller eigenvalue, of slopes summed over the pattern, in units of the frame's own noise.
+    """
+    smooth = np.asarray(cv2.GaussianBlur(grey, (0, 0), SMOOTH), np.float32)
+    # Immerkaer 1996, "Fast noise variance estimation", by medians: structure is rare beside noise
+    noise = np.median(np.abs(cv2.filter2D(grey, -1, NOISE)[::2, ::2])) / (6.0 * 0.6745)
+    gx, gy = (cv2.Scharr(smooth, cv2.CV_32F, *way, scale=1.0 / 32.0) for way in ((1, 0), (0, 1)))
+    # of the inner half of the pattern, so that what is seen lies in its middle; a pattern like it has four times that
+    half = max(3, pattern // 2 | 1)
+    xx, xy, yy = (cv2.boxFilter(part, -1, (half, half), normalize=False) for part in (gx * gx, gx * gy, gy * gy))
+    least = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+    floor = 1e-4 * float(np.ptp(smooth)) + 1e-9  # a frame of no noise at all
+    # what noise itself leaves of slopes after the Gauss: 1 / (8 pi s^4) of its variance
+    own = noise**2 * half**2 / (8.0 * np.pi * SMOOTH**4)
+    strength = (pattern / half) ** 2 * np.maximum(least - own, 0.0) / (noise**2 + floor**2)
+    return np.asarray(strength, np.float32), smooth
+
+
+def _blank_border(grey: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Pixels of a border without a picture (H, W): all darkest or all lightest, and joined to the edge of the frame."""
+    low, high = float(grey.min()), float(grey.max())
+    out = np.zeros(grey.shape, np.bool_)
+    for blank in (grey <= low + BLANK * (high - low), grey >= high - BLANK * (high - low)):
+        _, labels = cv2.connectedComponents(blank.astype(np.uint8), connectivity=4)
+        rim = np.concatenate((labels[0], labels[-1], labels[:, 0], labels[:, -1]))
+        out |= blank & np.isin(labels, np.unique(rim[rim > 0]))
+    return out
+
+
+NOISE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)

@@ -2,7 +2,8 @@
 
 A run is one key of one track followed in one direction. Every frame it is foretold (constant motion), fitted against
 its key's template, and judged; what fails is tried again with robust weights, then looked for around the place its
-neighbours foretell. A pattern out of sight is foretold on for some frames and taken back only on a strict likeness.
+neighbours foretell; when most fail at once, where sparse matches of the two frames say. A pattern out of sight is
+foretold on for some frames and taken back only on a strict likeness.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from core.match.blur import blurred, motion_lines
 from core.match.fit_kernel import FOUND, fit_patterns
+from core.match.guide import carried_by, guide_between
 from core.match.template import Templates, cut_templates
 from core.match.track import MODELS, TrackSettings
 
@@ -28,6 +30,8 @@ COLUMN = {name: k for k, name in enumerate(FOUND)}
 NO_HOLD = np.zeros((0, 0), np.bool_)
 ROBUST_ABOVE = 1.8  # times the variance a run is used to
 LOOSE, STRICT = 6.0, 2.5  # the same, still believed: where it was foretold, and anywhere else
+ALIKE = 0.95  # score of a new pattern that is believed whatever its residuals are
+RETURN = 0.25  # pixels a pattern found after a jump may miss the place it came from
 SURPRISE = 2.0  # pixels off the place foretold
 UNSURE = 1.0  # pixels, standard deviation
 NEIGHBOURS = 5
@@ -35,6 +39,7 @@ PEAKS = 3  # of the correlation that are tried
 NEARER = 0.1  # correlation that the edge of the search is worth less than its middle
 WHITE, CLUMPED = 0.07, 6.0  # lag correlation of good residuals; how much variance of the place more of it adds
 FADE = 0.8  # of the motion from frame to frame while out of sight
+EARNED = 30.0  # twice the logarithm of the likelihood that two more numbers must bring
 GRAIN = 4
 
 
@@ -68,8 +73,9 @@ class Runs:
         self.usual, self.likeness, self.lag = np.zeros(0), np.zeros(0), np.zeros(0)  # of the frames before
         self.age, self.missed = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self.size, self.stop = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.alive = np.zeros(0, np.bool_)
+        self.alive, self.guided = np.zeros(0, np.bool_), np.zeros(0, np.bool_)
         self._hold = NO_HOLD
+        self._before: Image | None = None  # the frame before, where the runs were
 
     @property
     def half(self) -> float:
@@ -101,6 +107,7 @@ class Runs:
             "lag": np.full(count, WHITE),
             "age": np.zeros(count, np.int64), "missed": np.zeros(count, np.int64),
             "size": np.full(count, size, np.int64), "stop": stop, "alive": np.ones(count, np.bool_),
+            "guided": np.zeros(count, np.bool_),
         }  # fmt: skip
         for name, value in fresh.items():
             setattr(self, name, np.concatenate((getattr(self, name), value)))
@@ -108,6 +115,7 @@ class Runs:
         found = self._fit(image, rows, warp, light, np.zeros(len(self.alive)))
         self.shared[rows] = found[rows, :3] * made.noise[:, None]
         self.alive[rows] = found[rows, COLUMN["pixels"]] > 0
+        self._before = image
         return rows
 
     def step(self, image: Image, hold: Mask | None = None) -> Seen:
@@ -130,6 +138,11 @@ class Runs:
             for place in self._places(image, unsure, sure, told, warp):
                 self._again(image, unsure, place, told, warp, light, found)
             good = self._judge(rows, found, warp, told)
+            here = (self.missed[rows] == 0) & _inside(told[rows], image)
+            if 2 * (here & ~good).sum() >= here.sum() > 0:
+                self._far(image, rows[here], told, warp, light, found)
+                good = self._judge(rows, found, warp, told)
+        self._before = image
         self._richer(image, rows[good], warp, light, found)
         return self._settle(rows, good, told, warp, light, found)
 
@@ -189,15 +202,16 @@ class Runs:
         variance, score, usual = f[:, COLUMN["variance"]], f[:, COLUMN["score"]], self.usual[rows]
         spread = np.sqrt(np.maximum(variance * (f[:, 0] + f[:, 2]), 0.0))
         area = warp[rows, 2] * warp[rows, 5] - warp[rows, 3] * warp[rows, 4]
-        before = self.warp[rows, 2] * self.warp[rows, 5] - self.warp[rows, 3] * self.warp[rows, 4]
+        before = told[rows, 2] * told[rows, 5] - told[rows, 3] * told[rows, 4]
         ratio = area / np.where(before == 0.0, 1.0, before)
         off = np.linalg.norm(warp[rows, :2] - told[rows, :2], axis=1)
         missed = self.missed[rows]
-        fresh = (self.age[rows] == 0) & (missed == 0)
-        calm = (off < SURPRISE) & (missed == 0)
+        fresh, guided = (self.age[rows] == 0) & (missed == 0), self.guided[rows]
+        calm = (off < SURPRISE) & (missed == 0) & ~guided
         like = score > np.where(fresh, 0.8, self.likeness[rows] - 0.1)
         near = (variance < LOOSE * usual) | (score > self.likeness[rows] - 0.05)
-        anywhere = (variance < np.where(fresh, LOOSE, STRICT) * usual) | (fresh & (score > 0.95))
+        alike = np.where(guided, ALIKE - 0.2, ALIKE)  # the matches are witnesses too
+        anywhere = (variance < np.where(fresh, LOOSE, STRICT) * usual) | ((fresh | guided) & (score > alike))
         good = (f[:, COLUMN["iterations"]] > 0) & (f[:, COLUMN["step"]] < 0.1) & (f[:, COLUMN["share"]] > 0.4)
         good &= (score >= self.settings.least_score) & (spread < UNSURE) & (f[:, COLUMN["gain"]] > 0.05)
         good &= off < 1.5 * self.settings.search + 1.0
@@ -206,15 +220,74 @@ class Runs:
         return good & np.where(calm, near, anywhere & like)
 
     def _again(
-        self, image: Image, rows: Rows, place: Reals, told: Reals, warp: Reals, light: Reals, found: Reals
+        self,
+        image: Image,
+        rows: Rows,
+        place: Reals,
+        told: Reals,
+        warp: Reals,
+        light: Reals,
+        found: Reals,
+        *,
+        robust: bool = True,
     ) -> None:
-        """Fit rows again from `place` (N, 8) with robust weights; keep what is believed and fits better."""
+        """Fit rows again from `place` (N, 8); keep what is believed and fits better."""
         tried, lit = place.copy(), self.light.copy()
-        again = self._fit(image, rows, tried, lit, STRICT * self.usual)
+        again = self._fit(image, rows, tried, lit, (STRICT if robust else 0.0) * self.usual)
         before = self._judge(rows, found, warp, told)
         lower = again[rows, COLUMN["variance"]] < found[rows, COLUMN["variance"]]
         better = rows[self._judge(rows, again, tried, told) & (lower | ~before)]
         warp[better], light[better], found[better] = tried[better], lit[better], again[better]
+
+    def _far(self, image: Image, rows: Rows, told: Reals, warp: Reals, light: Reals, found: Reals) -> None:
+        """The camera jumped: fit rows where sparse matches with the frame before say they went.
+
+        `told` becomes that. What was found elsewhere only looked alike and is forgotten; so is all that is new and
+        that the matches say nothing of.
+        """
+        guide = guide_between(self._before, image) if self._before is not None else None
+        if guide is None:
+            return
+        places, linear = carried_by(guide, self.warp[rows, :2])
+        known = np.isfinite(places[:, 0])
+        found[rows[~known & (self.age[rows] == 0)]] = 0.0
+        rows, places, linear = rows[known], places[known], linear[known]
+        off = np.linalg.norm(warp[rows, :2] - places, axis=1) > self.settings.search
+        off |= found[rows, COLUMN["done"]] == 0
+        rows, places, linear = rows[off], places[off], linear[off]
+        found[rows] = 0.0
+        told[rows, :2] = places
+        told[rows, 2:6] = (self.warp[rows, 2:6].reshape(-1, 2, 2) @ np.linalg.inv(linear)).reshape(-1, 4)
+        self.guided[rows] = True
+        for rank in range(PEAKS):
+            place = told.copy()
+            self._look(image, rows, place, rank)
+            # another view has other light, and residuals beside which the noise of the key is nothing
+            self._again(image, rows, place, told, warp, light, found, robust=False)
+        found[rows[~self._returns(image, rows, warp)]] = 0.0
+
+    def _returns(self, image: Image, rows: Rows, warp: Reals) -> Mask:
+        """Which rows come back: the pattern cut anew where it was found lies where it was in the frame before."""
+        if self._before is None or not len(rows):
+            return np.zeros(len(rows), np.bool_)
+        inside = np.clip(warp[rows, :2], 0.0, np.array(image.shape[1::-1]) - 1.0)
+        cut = cut_templates(image, inside, self.settings.pattern)
+        old = self.warp[rows]
+        back = np.zeros((len(rows), 8))
+        back[:, :2] = old[:, :2]
+        between = np.linalg.inv(warp[rows, 2:6].reshape(-1, 2, 2)) @ old[:, 2:6].reshape(-1, 2, 2)
+        back[:, 2:6] = between.reshape(-1, 4)
+        light = np.zeros((len(rows), self.channels, 2))
+        light[:, :, 0] = 1.0
+        sizes = np.full(len(rows), MODELS["affine"], np.int64)
+        found = np.zeros((len(rows), len(FOUND)))
+        every = np.arange(len(rows))
+        fit_patterns(
+            self._before, NO_HOLD, cut.coefficients, cut.keep, cut.centre, back, light, np.zeros(len(rows)), self.half,
+            sizes, every, 0, len(rows), found,
+        )  # fmt: skip
+        off = np.linalg.norm(back[:, :2] - old[:, :2], axis=1)
+        return np.asarray((off < RETURN) & (found[:, COLUMN["step"]] < 0.1) & (found[:, COLUMN["iterations"]] > 0))
 
     def _places(self, image: Image, rows: Rows, sure: Rows, told: Reals, warp: Reals) -> list[Reals]:
         """Where else rows may be: the likeliest peaks around the places that what their neighbours did foretells."""
@@ -273,7 +346,9 @@ class Runs:
         self.size[due] = 8
         again = self._fit(image, due, tried, lit, np.zeros(len(self.alive)))
         fall = np.log(np.maximum(found[due, 3], 1e-30) / np.maximum(again[due, 3], 1e-30))
-        earned = (again[due, COLUMN["done"]] > 0) & (fall * found[due, COLUMN["pixels"]] * self.channels > 30.0)
+        # neighbouring residuals that are alike count for less than their number
+        witnesses = found[due, COLUMN["pixels"]] * self.channels / clumped(self.lag[due])
+        earned = (again[due, COLUMN["done"]] > 0) & (fall * witnesses > EARNED)
         self.size[due[~earned]] = 6
 
     def _blur(self, rows: Rows, told: Reals) -> None:
@@ -304,6 +379,8 @@ class Runs:
         self.usual[kept] += share * (np.minimum(variance, 3.0 * self.usual[kept]) - self.usual[kept])
         score = found[kept, COLUMN["score"]]
         self.likeness[kept] += np.where(self.age[kept] == 0, 1.0, 0.2) * (score - self.likeness[kept])
+        self.motion[kept[self.guided[kept]]] = 0.0  # a jump is not what follows
+        self.guided[:] = False
         self.age[kept] += 1
         self.missed[kept] = 0
         self.warp[lost, :2] = told[lost, :2]
@@ -313,8 +390,17 @@ class Runs:
         self.alive[lost[(self.missed[lost] > self.settings.patience) | (self.age[lost] == 0)]] = False
         # residuals of a model that does not quite hold are correlated, and say less than their number
         self.lag[kept] += np.where(young, 0.5, 0.2) * (found[kept, COLUMN["lag"]] - self.lag[kept])
-        own = found[kept, :3] * (variance * (1.0 + CLUMPED * np.maximum(self.lag[kept] - WHITE, 0.0)))[:, None]
+        own = found[kept, :3] * (variance * clumped(self.lag[kept]))[:, None]
         return Seen(kept, self.warp[kept, :2].copy(), own + carried(self.warp[kept], self.shared[kept]), own, score)
+
+
+def _inside(warp: Reals, image: Image) -> Mask:
+    return np.asarray(((warp[:, :2] >= 0) & (warp[:, :2] <= [image.shape[1] - 1, image.shape[0] - 1])).all(axis=1))
+
+
+def clumped(lag: Reals) -> Reals:
+    """How many residuals with this lag correlation say as much as one that is independent."""
+    return np.asarray(1.0 + CLUMPED * np.maximum(lag - WHITE, 0.0))
 
 
 def carried(warp: Reals, shared: Reals) -> Reals:

@@ -17,6 +17,7 @@ from core.workers import serial_ranges
 Image = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 REFILL = 8  # frames between looks for new features
+SCARCE = 0.8  # of the features that are wanted: when fewer are left, new ones are looked for at once
 
 
 class Step(NamedTuple):
@@ -64,6 +65,7 @@ class Tracking:
         self._hold = hold if hold is not None else _nothing_held
         self._given = list(tracks)
         self._pieces: dict[int, list[Piece]] = {track.id: [] for track in tracks}
+        self._features: set[int] = set()
 
     def steps(self) -> Iterator[Step]:
         """Frames as they are made, forward then backward."""
@@ -71,8 +73,9 @@ class Tracking:
             yield from self._sweep(direction)
 
     def tracks(self) -> tuple[Track, ...]:
-        """What has been tracked so far."""
-        return tuple(join_pieces(track, self._pieces[track.id]) for track in self._given)
+        """What has been tracked so far. Features that were never seen again are no tracks."""
+        made = [join_pieces(track, self._pieces[track.id]) for track in self._given]
+        return tuple(track for track in made if len(track.frames) > 1 or track.id not in self._features)
 
     def _sweep(self, direction: int) -> Iterator[Step]:
         starts = self._starts(direction)
@@ -98,7 +101,8 @@ class Tracking:
                 owners[row].add(frame, *numbers)
             runs.alive[runs.stop == frame] = False
             begin = starts.pop(frame, [])
-            if finding and n % REFILL == 0:
+            last = frame == self._frames[-1] and n > 0
+            if finding and not last and (n % REFILL == 0 or runs.alive.sum() < SCARCE * finding):
                 begin += self._found(image, frame, runs, hold)
             if begin:
                 stops = np.array([start.stop for start in begin], np.int64)
@@ -128,6 +132,7 @@ class Tracking:
         starts = []
         for x, y in points:
             track_id = max(self._pieces, default=0) + 1
+            self._features.add(track_id)
             self._given.append(keyed_track(track_id, f"auto{track_id:04d}", np.array([[frame, x, y]])))
             self._pieces[track_id] = []
             starts.append(Start(track_id, (x, y), self._frames[-1]))
