@@ -40,6 +40,7 @@ from core.pose.synthesis import pose_at
 from core.record import freeze
 
 LARGEST_JSON = 64 << 20  # bytes
+FARTHEST = 1e6  # degrees, metres, units of a number: beyond it single precision loses the mesh
 TORN = 1e-5  # of the size of a sculpt: what sides of a seam may be apart by rounding
 Three = tuple[float, float, float]
 
@@ -208,6 +209,8 @@ def read_sculpt(
         raise UserError(f"{where}: the sculpt {path.name} cannot be opened ({error.strerror or error}).") from None
     except UserError as error:
         raise UserError(f"{where}: {error}") from error
+    except ValueError:
+        raise UserError(f"{where}: the sculpt {path.name!r} is no name of a file.") from None
     vertices = len(rig.skin.joints)
     there = np.arange(vertices) if rig.file_vertices is None else rig.file_vertices
     if len(points) != len(there):
@@ -217,6 +220,8 @@ def read_sculpt(
         )
     if not np.isfinite(points).all():
         raise UserError(f"{where}: the sculpt {path.name} has vertices that are no finite numbers; export it again.")
+    if np.abs(points).max(initial=0.0) > FARTHEST:
+        raise UserError(f"{where}: the sculpt {path.name} lies beyond {FARTHEST:,.0f} metres; export it in metres.")
     count = np.bincount(there, minlength=vertices)
     total = np.stack([np.bincount(there, points[:, k], minlength=vertices) for k in range(3)], axis=1)
     if not count.all():
@@ -284,6 +289,7 @@ def _pose(name: str, controls: Controls, rig: Rig, where: str) -> Pose:
         if isinstance(value, Movement):
             if control not in joints:
                 raise UserError(f"{where}: {control!r} is a number, not a joint; give it as {control!r}: 1.0.")
+            _check_size((*(value.rotate or ()), *(value.translate or ())), control, where)
             if value.rotate is not None:
                 rotations[control] = tuple(map(float, quaternion_from_euler(value.rotate)))
             if value.translate is not None:
@@ -291,8 +297,14 @@ def _pose(name: str, controls: Controls, rig: Rig, where: str) -> Pose:
         elif control in joints:
             raise UserError(f'{where}: {control!r} is a joint; give it as {control!r}: {{"rotate": [x, y, z]}}.')
         else:
+            _check_size((value,), control, where)
             numbers[control] = float(value)
     return Pose(name=name, rotations=rotations, translations=translations, numbers=numbers)
+
+
+def _check_size(values: tuple[float, ...], control: str, where: str) -> None:
+    if not all(abs(value) <= FARTHEST for value in values):
+        raise UserError(f"{where}: {control!r} is set beyond {FARTHEST:,.0f}; give a number nearer to 0.")
 
 
 def _check_control(name: str, rig: Rig, where: str) -> None:

@@ -152,10 +152,14 @@ def test_refusals_name_the_poses(folder):
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "falloff": {"knee": 3}}, "knee"),
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "falloff": {"elbow": [3, 3]}}, "falloff"),
     ({"controls": {}, "name": "rest"}, "'rest'"),
+    ({"controls": {"elbow": {"translate": [0, 1e300, 0]}}}, "'elbow' is set beyond"),
+    ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "sculpt": "far.obj"}, "metres"),
+    ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "sculpt": "a\0.obj"}, "no name of a file"),
     ({"controls": {"elbow": {"rotate": [0, 0, 9]}}, "colour": 1}, "colour"),
 ], ids=str)
 def test_what_is_wrong_with_a_pose_is_said_in_one_sentence(folder, pose, words):
     (folder / "short.obj").write_text("v 0 0 0\n")
+    write_points(folder / "far.obj", read_points(folder / "bent.obj") * 1e9)
     done = build(folder, [{"name": "odd", "sculpt": None, **pose}], "-o", folder / "no.filo")
     assert done.returncode == 1
     said = json.loads(done.stdout)["error"]
