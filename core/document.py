@@ -75,6 +75,7 @@ class Document(Record):
 
     meshes, grooms, plates, tracks, planes, masks : each with ids unique among their kind; the last three are of a
         plate.
+    track_selection : ids of the selected tracks, the active one last; ids of deleted ones mean nothing.
     """
 
     unit: Annotated[str, field(
@@ -99,6 +100,7 @@ class Document(Record):
     tracks: tuple[Track, ...] = ()
     planes: tuple[PlaneTrack, ...] = ()
     masks: tuple[Mask, ...] = ()
+    track_selection: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if self.unit not in METRES_PER_UNIT:

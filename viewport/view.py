@@ -233,17 +233,23 @@ class View3D:
             set_uniforms(self.copy, {"picture": 0})
             self.copy_triangle.render(moderngl.TRIANGLES, vertices=3)
         self._draw_references(size)
+        self.draw_over(size, overlays, hud if self.options.hud else (), ratio, self.options.axes)
+        self.picture_changed = False
+
+    def draw_over(
+        self, size: tuple[int, int], overlays: Sequence[Overlay], hud: Sequence[HudLine], ratio: float, axes: bool
+    ) -> None:
+        """Draw marks and words over what is in the bound framebuffer."""
         rows = [marks(overlays, self.tones, ratio)]
         words = labels(overlays, self.tones)
-        if self.options.axes and self.camera is not None:
+        if axes and self.camera is not None:
             lines, names = axes_marks(self.camera, size, ratio)
             rows.insert(0, lines)
             words += names
         self.marks.draw(np.concatenate(rows), size, ratio)
-        if self.options.hud:
+        if hud or self.options.hud:
             words += self._hud_words(hud, ratio)
         self.images.draw_words(words, TEXT_PIXELS * ratio, size)
-        self.picture_changed = False
 
     def _draw_references(self, size: tuple[int, int]) -> None:
         for reference in self.options.references:

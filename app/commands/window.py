@@ -13,7 +13,7 @@ from core.errors import UserError
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="A project or a mesh to open.", show_default=False)] = None,
+    file: Annotated[Path | None, typer.Argument(help="A project, a mesh or a plate to open.", show_default=False)] = None,
     demo: Annotated[bool, typer.Option("--demo", help="Open the demo animal with its coat.")] = False,
     safe: Annotated[bool, typer.Option("--safe", help="Start without a studio's own tools.")] = False,
     screenshot: Annotated[Path | None, typer.Option(help="Save a picture of the settled window as PNG, then leave.", show_default=False)] = None,

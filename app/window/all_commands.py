@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.window.commands import Command
 from app.window.curve_commands import CURVES
 from app.window.file_commands import EDIT, FILE, MACRO
+from app.window.match_commands import MATCH, PLATE_FILES
 from app.window.plugin_bar import trouble_commands
 from app.window.pose_look import POSE_LOOK
 from app.window.scene_commands import SCENE
@@ -17,6 +18,6 @@ from tools.registry import Registry
 def all_commands(registry: Registry) -> tuple[Command, ...]:
     """Every command there is, in the order of the menus; those of the tools come from `registry`."""
     return (
-        *FILE, *EDIT, *SCENE, *VIEW, *POSE_LOOK, *FRAME, *CURVES, *tool_commands(registry), *HAND, *ACTION_COMMANDS,
-        *MACRO, *WINDOW, *trouble_commands(registry),
+        *FILE, *PLATE_FILES, *EDIT, *SCENE, *VIEW, *POSE_LOOK, *FRAME, *CURVES, *tool_commands(registry), *HAND,
+        *ACTION_COMMANDS, *MATCH, *MACRO, *WINDOW, *trouble_commands(registry),
     )

@@ -13,14 +13,15 @@ from core.errors import UserError
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
+    from app.window.match_view import PlateView
     from app.window.settings import Settings
 
 # what a command changes; only changes of the document are undo steps
 Touches = Literal["document", "history", "workspace", "file", "settings", "window"]
 # where its hotkey works: the same key may mean different things over different parts of the window, and over the view
 # in different crafts
-Scope = Literal["everywhere", "viewport", "outliner", "curves", "groom", "pose"]
-CRAFT_SCOPES: tuple[Scope, ...] = ("groom", "pose")
+Scope = Literal["everywhere", "viewport", "outliner", "curves", "groom", "pose", "match"]
+CRAFT_SCOPES: tuple[Scope, ...] = ("groom", "pose", "match")
 
 MOST_RECENT = 20
 
@@ -39,6 +40,11 @@ class Window(Protocol):
     @property
     def playing(self) -> bool:
         """True during playback."""
+        ...
+
+    @property
+    def match(self) -> PlateView:
+        """The plate in the view, and what follows tracks on it."""
         ...
 
     def new_document(self) -> None: ...

@@ -184,7 +184,7 @@ class Doors(QWidget):
         self._look()
 
     def _look(self) -> None:
-        empty = not self._desk.document.meshes
+        empty = not (self._desk.document.meshes or self._desk.document.plates)
         if empty != self._empty:
             again, self._empty = self._empty is not None, empty
             if empty and again:

@@ -34,6 +34,7 @@ from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
+from app.window.match_view import PlateView
 from app.window.memory import give_back_freed_memory
 from app.window.opening import Opening
 from app.window.outliner import Outliner
@@ -86,7 +87,8 @@ class MainWindow(QMainWindow):
         self.commands.add(all_commands(session.tools))
         loaded = keymaps.load(settings.keymap, folder)
         self.hotkeys = Hotkeys(self, self.commands, loaded.keymap)
-        self.opening = Opening(self.desk, self, self.make_session, self.remember)
+        self.opening = Opening(
+            self.desk, self, self.make_session, self.remember, lambda path: self.match.doors.open_plate(path))
         self.files = FileActions(self)
         self.crash_watch = CrashWatch(parent=self)
         self.photographer: Photographer | None = None
@@ -190,6 +192,12 @@ class MainWindow(QMainWindow):
         wide = COLUMN_WIDTH * look_of().text
         self.split.setSizes([max(self.width() - wide - self.shelf.sizeHint().width(), 100), wide])
 
+    def _scale_column(self, factor: float) -> None:
+        """The panels need more room for larger letters, up to half of the window."""
+        middle, column = self.split.sizes()
+        wide = min(round(column * factor), (middle + column) // 2)
+        self.split.setSizes([middle + column - wide, wide])
+
     def _restore(self, settings: Settings) -> None:
         if settings.geometry:
             self.restoreGeometry(QByteArray(base64.b64decode(settings.geometry)))
@@ -225,6 +233,11 @@ class MainWindow(QMainWindow):
     def settings(self) -> Settings:
         """The preferences now."""
         return self._settings
+
+    @property
+    def match(self) -> PlateView:
+        """The plate in the view."""
+        return self.viewport.plate
 
     @property
     def playing(self) -> bool:
@@ -358,6 +371,7 @@ class MainWindow(QMainWindow):
             assert isinstance(application, QApplication)
             apply(application, load_theme(new.theme), new.text_size)
             self._take_look()
+            self._scale_column(new.text_size / old.text_size)
         if old.keymap != new.keymap:
             self._keymap_changed(keymaps.load(new.keymap, self._folder).keymap)
         if old.unit != new.unit:
@@ -417,9 +431,10 @@ class MainWindow(QMainWindow):
         self.setWindowModified(not session.saved)
 
     def _show_middle(self) -> None:
-        self.middle.setCurrentWidget(self.sides if self.desk.document.meshes else self.doors)
+        something = bool(self.desk.document.meshes or self.desk.document.plates)
+        self.middle.setCurrentWidget(self.sides if something else self.doors)
         # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
-        self.doors.setMinimumWidth(1 if self.desk.document.meshes else 0)
+        self.doors.setMinimumWidth(1 if something else 0)
         self.status.show_hint()
 
     def show_saved(self) -> None:
@@ -498,6 +513,7 @@ class MainWindow(QMainWindow):
             self.change_settings(geometry=_text(self.saveGeometry()), panels=_text(self.split.saveState()))
         self.desk.jobs.close()
         self.viewport.release_gl()
+        self.viewport.plate.close()
         self.desk.session.changed = None
         self.desk.session.close(discard=not self._keeps_place)
         self.crash_watch.close()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from app.deliver import turned_view
 from app.window.desk import Desk
 from app.window.keymap import Navigation
+from app.window.match_eye import PlateEye
 from core import navigate
 from core.camera import Camera, frame_points, ray_through
 from core.mesh.bvh import cast_rays
@@ -35,14 +36,15 @@ class Eye:
     Parameters
     ----------
     size : of the picture in pixels of the framebuffer. ratio : of these to pixels of Qt. changed : called when the
-        camera of a workspace without one has become another.
+        camera of a workspace without one has become another. plate : how a plate is looked at while one is shown.
     """
 
     def __init__(
         self, desk: Desk, size: Callable[[], tuple[int, int]], ratio: Callable[[], float],
-        changed: Callable[[], object],
+        changed: Callable[[], object], plate: PlateEye | None = None,
     ) -> None:
         self.desk, self.size, self.ratio, self.changed = desk, size, ratio, changed
+        self._plate = plate
         self.trackball = False  # how orbiting turns; tumbling is the other way
         self._pivot: Array | None = None
         self._corners: tuple[object, Array] | None = None
@@ -51,8 +53,15 @@ class Eye:
         self._given: Camera | None = None  # to a workspace without one
 
     @property
+    def flat(self) -> PlateEye | None:
+        """How the plate is looked at, while one is shown."""
+        return self._plate if self._plate is not None and self._plate.shown else None
+
+    @property
     def camera(self) -> Camera:
         """The camera of the workspace; when it has none, it is given one that sees everything."""
+        if self.flat is not None:
+            return self.flat.camera
         cameras = self.desk.workspace.cameras
         if cameras:
             return cameras[0]
@@ -81,23 +90,34 @@ class Eye:
 
     def look(self, camera: Camera) -> None:
         """Look through a camera; near and far are put about what there is."""
+        if self.flat is not None:
+            self.flat.look(camera)
+            return
         clipped = navigate.with_clipping(camera, self.corners())
         self.desk.set_workspace(cameras=(clipped, *self.desk.workspace.cameras[1:]))
 
     def look_from(self, side: str) -> None:
         """Turn to one of the sides of the animal, about what was looked at; the first time when its front is found."""
-        if self.facing is None:
+        if self.flat is not None:
+            self.desk.said.emit("A plate is seen straight on; drag it, or zoom with the wheel.")
+        elif self.facing is None:
             self._find_front(lambda: self.look_from(side))
         else:
             self.look(navigate.turned_to(self.camera, self.pivot, self._direction(side)))
 
     def frame_all(self) -> None:
         """Come so near or far that everything just fits."""
+        if self.flat is not None:
+            self.flat.fit()
+            return
         self._pivot = None
         self.look(navigate.frame(self.camera, self.points(), self._aspect()))
 
     def frame_selected(self) -> None:
-        """The same for the selected guides; everything when none are."""
+        """The same for the selected guides; everything when none are. On a plate the active track in the middle."""
+        if self.flat is not None:
+            self.flat.find_active()
+            return
         groom = self.desk.groom
         if groom is None or not groom.guides.selected.any():
             self.frame_all()
@@ -112,7 +132,8 @@ class Eye:
 
     def toggle_projection(self) -> None:
         """A lens or parallel rays; what is looked at keeps its size."""
-        self.look(navigate.with_projection(self.camera, self.pivot, not self.camera.orthographic))
+        if self.flat is None:
+            self.look(navigate.with_projection(self.camera, self.pivot, not self.camera.orthographic))
 
     def pinch(self, x: float, y: float, factor: float) -> None:
         """Come nearer to what is under the cursor: `factor` times the distance is left."""
@@ -121,7 +142,7 @@ class Eye:
     def wheel(self, action: Navigation, notches: float, x: float, y: float) -> None:
         """What the wheel does to the view."""
         factor = NOTCH**notches
-        if action == "zoom":
+        if action == "zoom" and self.flat is None:
             self.look(navigate.zoom(self.camera, factor))
         else:
             self.pinch(x, y, factor)
@@ -137,6 +158,8 @@ class Eye:
 
     def take_pivot(self, x: float, y: float) -> Array:
         """Make what lies under a pixel the pivot, when there is skin; otherwise it stays as it was."""
+        if self.flat is not None:
+            return self.flat.under(x, y)
         found = self.under(x, y)
         if found is not None:
             self._pivot = found
@@ -233,6 +256,8 @@ class CameraDrag:
     """A gesture that moves the camera from press to release. words : what moving does."""
 
     def __init__(self, eye: Eye, action: Navigation, x: float, y: float) -> None:
+        if eye.flat is not None:  # a plate does not turn
+            action = "pan" if action in ("orbit", "tumble", "pan") else "dolly"
         self._eye, self._action = eye, action
         self.words = WORDS[action]
         self._before = eye.camera

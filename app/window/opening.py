@@ -20,6 +20,7 @@ from core.evaluator import Evaluator
 from core.formats import mesh_file, picture, rig_file
 from core.formats.arrays import ArrayHashes
 from core.formats.mesh_file import MeshFile, read_mesh
+from core.formats.plate_file import is_plate
 from core.formats.project import Project, read_project
 from core.formats.rig_assembly import NoRig, RigFile
 from core.formats.rig_file import document_of, read_rig
@@ -50,7 +51,7 @@ class Opening(QObject):
     Parameters
     ----------
     parent : of the file dialogs.
-    make : makes sessions. remember : called with every file that was opened.
+    make : makes sessions. remember : called with every file that was opened. open_plate : opens a plate.
 
     opened : a document or a mesh came in; a view may frame it.
     """
@@ -60,9 +61,11 @@ class Opening(QObject):
     def __init__(
         self, desk: Desk, parent: QWidget | None = None, make: MakeSession = Session,
         remember: Callable[[Path], object] = lambda path: None,
+        open_plate: Callable[[Path], object] = lambda path: None,
     ) -> None:
         super().__init__(desk)
         self._desk, self._parent, self._make, self._remember = desk, parent, make, remember
+        self._open_plate = open_plate
         self._sources: dict[str, Path] = {}  # where meshes of this run came from, by name
 
     # -- asking ----------------------------------------------------------------------------------------------
@@ -85,7 +88,9 @@ class Opening(QObject):
     def open(self, path: Path) -> None:
         """Open a project, or a mesh as a new document (into the present one while that is empty)."""
         suffix = path.suffix.lower()
-        if suffix in PROJECT_SUFFIXES:
+        if is_plate(path):
+            self._open_plate(path)
+        elif suffix in PROJECT_SUFFIXES:
             self._open_project(path)
         elif suffix in CLIP_SUFFIXES:
             self._read_clip(path)
@@ -231,18 +236,21 @@ class Opening(QObject):
         ) for suffix in suffixes}
         by_kind: dict[str, list[Path]] = {}
         for path in paths:
-            by_kind.setdefault(kinds.get(path.suffix.lower(), "other"), []).append(path)
+            kind = "plate" if is_plate(path) else kinds.get(path.suffix.lower(), "other")
+            by_kind.setdefault(kind, []).append(path)
         for path in by_kind.get("project", [])[:1]:
             self.open(path)
         if "project" not in by_kind:
             for path in by_kind.get("mesh", []):
                 self.import_mesh(path)
             self._pin(by_kind.get("picture", []))
+            for path in by_kind.get("plate", []):
+                self._open_plate(path)
         strange = by_kind.get("other", [])
         if strange or not paths:
             what = strange[0].name if strange else "What was dropped"
             self._desk.error(UserError(
-                f"{what} is nothing that can be opened; drop a project (.filo), a mesh, a rig or a picture."))
+                f"{what} is nothing that can be opened; drop a project (.filo), a mesh, a rig, a plate or a picture."))
         elif len(paths) > 1 and "project" in by_kind:
             self._desk.said.emit(f"{by_kind['project'][0].name} is opened; drop the other files after it.")
 
@@ -251,7 +259,7 @@ class Opening(QObject):
         pinned = list(view.references)
         for path in paths:
             offset = 0.03 * (len(pinned) % 8)
-            pinned.append(Reference(path=str(path), x=0.02 + offset, y=0.02 + offset))
+            pinned.append(Reference(path=str(path), x=0.02 + offset, y=0.2 + offset))  # below the figures
         if len(pinned) > len(view.references):
             self._desk.set_workspace(view=view.replace(references=tuple(pinned)))
 

@@ -22,6 +22,7 @@ from app.window.memory import keep_freed_memory
 from app.window.settings import LoadedSettings, load_settings
 from app.window.theme import apply, load_theme, look_of
 from core.errors import UserError
+from core.formats.plate_file import is_plate
 from core.kernel_cache import kernels_compiled
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def run(wish: Wish) -> int:
         There is no display, or the picture asked for could not be made.
     """
     for path, what in ((wish.file, "file"), (wish.after, "script")):
-        if path is not None and not path.is_file():
+        if path is not None and not (path.is_file() or is_plate(path)):
             raise UserError(f"there is no {what} {path}")
     if sys.platform.startswith("linux") and not any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")

@@ -121,7 +121,7 @@ class StatusLine(QWidget):
             self.show_hint()
 
     def _jobs_changed(self) -> None:
-        if not self._until.isActive() and not self._desk.document.meshes:
+        if not self._until.isActive() and not (self._desk.document.meshes or self._desk.document.plates):
             self.show_hint()
 
     def _copy(self) -> None:
@@ -130,11 +130,12 @@ class StatusLine(QWidget):
 
 def hint(desk: Desk, keymap: Keymap) -> str:
     """What mouse and keys do now, in one line."""
-    if not desk.document.meshes and desk.jobs.running:
+    empty = not (desk.document.meshes or desk.document.plates)
+    if empty and desk.jobs.running:
         return f"{desk.jobs.running[0].name}: this takes a moment. Cancel at the right ends it."
-    if not desk.document.meshes:
-        return "Open a mesh or a project, or drop a file here."
-    parts = [desk.session.tool.hint] if desk.document.grooms or desk.session.tool.craft == "pose" else []
+    if empty:
+        return "Open a mesh, a plate or a project, or drop a file here."
+    parts = [desk.session.tool.hint] if desk.document.grooms or desk.session.tool.craft != "groom" else []
     parts += [f"{_written(keys)}: {words}" for brush, words in (("size", "size"), ("strength", "strength"))
               if (keys := keymap.brush.get(brush))]  # type: ignore[call-overload] # these are names of the record
     parts += [f"{_written(keys)}: {words}" for action, words in ACTIONS

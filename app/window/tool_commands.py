@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from app.window.commands import Command, Window
+from app.window.commands import CRAFT_SCOPES, Command, Window
 from core.falloff import SHAPES
 from tools.groom.actions import ACTIONS, Action
 from tools.pose.actions import ACTIONS as POSE_ACTIONS
@@ -69,7 +69,7 @@ def tool_command(tool: type[Tool[Any]]) -> Command:
     """The command that takes a tool into the hand."""
     return Command(
         f"tool.{tool.name}", tool.label, tool.tooltip, _choose(tool.name), _CHOOSE, checked=_is_chosen(tool.name),
-        icon=tool.icon, scope="pose" if tool.craft == "pose" else "groom", words=f"tool brush {tool.craft}")
+        icon=tool.icon, scope=tool.craft if tool.craft in CRAFT_SCOPES else "groom", words=f"tool brush {tool.craft}")
 
 
 def tool_commands(registry: Registry) -> tuple[Command, ...]:

@@ -18,8 +18,8 @@ from app.window.theme import look_of, text_font
 LITTLE = 5.0  # seconds between two words about the autosave
 LOOK_AGAIN = 400  # ms after a change, when the autosave has had its time
 ABOUT = {
-    "File": "file", "Edit": "edit", "View": "view", "Tools": "tool", "Groom": "groom", "Pose": "pose", "Time": "frame",
-    "Curves": "curves", "Window": "window",
+    "File": "file", "Edit": "edit", "View": "view", "Tools": "tool", "Groom": "groom", "Pose": "pose",
+    "Match": "match", "Time": "frame", "Curves": "curves", "Window": "window",
 }
 
 
@@ -61,7 +61,7 @@ class TopBar(QWidget):
         """Say which file this is and whether the work is safe."""
         session = self._desk.session
         name = "Not saved yet" if session.path is None else session.path.name
-        if not session.document.meshes and session.path is None:
+        if not (session.document.meshes or session.document.plates) and session.path is None:
             name = ""
         trouble, written = session.autosave_error, session.autosaved
         state = ""

@@ -38,6 +38,7 @@ from app.window.desk import Desk
 from app.window.gestures import BrushDrag, Gestures
 from app.window.hotkeys import Hotkeys
 from app.window.live_picture import LivePicture, Stopwatch
+from app.window.match_view import PlateView
 from app.window.navigation import CameraDrag, Eye
 from app.window.pose_overlay import skeleton_of
 from app.window.pose_views import PoseViews
@@ -81,7 +82,9 @@ class Viewport(QOpenGLWindow):
         self.views = PoseViews(desk)
         self.views.fresh.connect(self.redraw)
         self._pane = 0  # the one the pointer is in
-        self.eye = Eye(desk, self.pixels, self.devicePixelRatio, self.redraw)
+        self.plate = PlateView(desk, self.pixels, window)
+        self.plate.fresh.connect(self.redraw)
+        self.eye = Eye(desk, self.pixels, self.devicePixelRatio, self.redraw, self.plate.eye)
         self.gestures = Gestures(desk, self.eye, hotkeys, commands, window)
         self.gestures.pictures.shape = self._shape_of
         self._hinted = ""
@@ -148,6 +151,8 @@ class Viewport(QOpenGLWindow):
     def at_rest(self) -> bool:
         """True when the picture is finished and nothing more will change it."""
         picture = self.picture
+        if picture is not None and self.plate.shown:
+            return self.plate.settled and not self.pending
         return picture is not None and picture.settled and not self.pending and not self._rest.isActive()
 
     def draw_frame(self, frame: float, size: tuple[int, int]) -> Iterator[object]:
@@ -199,6 +204,7 @@ class Viewport(QOpenGLWindow):
         self._rest.stop()
         if self.picture is not None and self.context() is not None:
             self.makeCurrent()
+            self.plate.release()
             self.picture.release()
             self.picture = None
             if self._ctx is not None:
@@ -231,6 +237,11 @@ class Viewport(QOpenGLWindow):
             return
         picture, drawing = self.picture, self._stale
         self._moved = False
+        if self.plate.shown:
+            self._stale = False
+            ratio = self.devicePixelRatio()
+            self.plate.paint(picture.view, self._screen, self._whole(), self._overlays(), self._pointer, ratio)
+            return
         if drawing:
             self._stale = False
             self._draw_watch.start()
@@ -255,6 +266,10 @@ class Viewport(QOpenGLWindow):
             if self.picture.view.opening:
                 self.redraw()
         self.painted.emit()
+        if self.plate.shown:
+            if self.plate.settled:
+                self.settled.emit()
+            return
         if self.picture is not None and not self.picture.settled and not self._rest.isActive() and not self._busy():
             self._rest.start(CALM_MS)
 
@@ -264,7 +279,7 @@ class Viewport(QOpenGLWindow):
     def _rest_a_little(self) -> None:
         """One slice of finishing; the next comes after whatever events there are."""
         picture = self.picture
-        if picture is None or self._lent or self._busy() or self._stale or not self.isExposed():
+        if picture is None or self._lent or self._busy() or self._stale or self.plate.shown or not self.isExposed():
             return
         prepare = self.desk.session.hand.preparation()
         if prepare is not None:  # so that the next press need not wait for it
@@ -289,7 +304,8 @@ class Viewport(QOpenGLWindow):
 
     def _overlays(self) -> Overlays:
         gestures, pointer = self.gestures, self._pointer
-        under = gate_marks(self.desk.workspace.view, self.eye.camera, self.pixels(), self.devicePixelRatio())
+        under: Overlays = () if self.plate.shown else gate_marks(
+            self.desk.workspace.view, self.eye.camera, self.pixels(), self.devicePixelRatio())
         under += skeleton_of(self.desk, self.eye.camera, self.pixels(), self.devicePixelRatio())
         if pointer is None or isinstance(gestures.drag, CameraDrag):
             return under + gestures.overlays()
@@ -333,7 +349,7 @@ class Viewport(QOpenGLWindow):
         self.redraw()
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
-        seen = ("frame", "view", "groom", "cameras", "tool")
+        seen = ("frame", "view", "groom", "cameras", "tool", "craft")
         if any(getattr(old, name) is not getattr(new, name) for name in seen):
             self.redraw()
         else:

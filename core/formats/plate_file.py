@@ -22,6 +22,11 @@ MOVIES = (".mp4", ".mov", ".mkv", ".avi", ".m4v", ".webm", ".mxf", ".mpg")
 MOST_FRAMES = 1_000_000
 
 
+def is_plate(path: Path) -> bool:
+    """True for what can only be meant as a plate: a folder, a movie or a pattern of numbered files."""
+    return path.is_dir() or path.suffix.lower() in MOVIES or "#" in path.name or "%" in path.name
+
+
 def read_plate(path: str | Path, decoder: FrameDecoder, *, plate_id: int = 1) -> Plate:
     """Look at a plate: which frames it has, and what its first readable one says of itself.
 
@@ -81,7 +86,7 @@ class PlateFrames:
     ) -> None:
         self.plate, self.proxy = plate, proxy
         self._decoder, self._root = decoder, root
-        self.cache = FrameCache(self._read, plate.frames, budget, ahead)
+        self.cache = FrameCache(self.read, plate.frames, budget, ahead)
 
     def get(self, frame: int) -> NDArray[Any] | None:
         """Pixels (H, W, 1 or 3) of the frame the files call `frame`, read-only; None where it is missing or broken."""
@@ -95,7 +100,8 @@ class PlateFrames:
     def close(self) -> None:
         self.cache.close()
 
-    def _read(self, frame: int) -> NDArray[Any]:
+    def read(self, frame: int) -> NDArray[Any]:
+        """As :meth:`get` without holding it; UserError when the frame is missing, broken or of another size."""
         plate = self.plate
         path = Path(frame_name(plate.path, frame))
         if self._root is not None:

@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 6
+FORMAT = 7
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -55,9 +55,14 @@ def keyed_clips(raw: Raw) -> Raw:
     return raw
 
 
+def selected_tracks(raw: Raw) -> Raw:
+    """6 -> 7: tracks may be selected; as none were, nothing is to be changed."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
 UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {
-    1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks, 5: keyed_clips}
+    1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks, 5: keyed_clips, 6: selected_tracks}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:

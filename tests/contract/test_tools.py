@@ -25,6 +25,7 @@ REGISTRY = Registry(())
 TOOLS = REGISTRY.tools
 GROOM = [kind.name for kind in REGISTRY.of("groom")]
 POSE = [kind.name for kind in REGISTRY.of("pose")]
+MATCH = [kind.name for kind in REGISTRY.of("match")]
 HIDDEN = {"clone": {"source", "source_groom"}}  # what a stroke leaves in the settings; no panel shows it
 
 
@@ -42,7 +43,8 @@ def test_no_file_was_left_out_and_the_names_are_these():
         "rotate", "move", "ik", "grab", "draw", "inflate", "sculpt_smooth", "relax", "pinch", "flatten", "restore",
         "mask", "weights",
     ]  # fmt: skip
-    assert [*GROOM, *POSE] == list(TOOLS)
+    assert MATCH == ["track_point"]
+    assert [*GROOM, *POSE, *MATCH] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)
 
 

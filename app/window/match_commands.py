@@ -1,0 +1,204 @@
+"""Commands of matchmoving: following tracks, editing them, and how the plate is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from app.window.commands import Command, Window
+from core.document import Document
+from core.match.follow import Way
+from tools import match_edits
+from tools.match_edits import selected_tracks, shown_plate
+
+if TYPE_CHECKING:
+    from app.window.desk import Desk
+
+NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
+_TRACKING = "core.match.tracker.Tracking"
+_VIEW = "core.image.plate_view.plate_camera"
+FEATURES = 60
+
+
+def needs_plate(desk: Desk) -> str | None:
+    """A plate must be in view."""
+    return None if shown_plate(desk.document) is not None else NO_PLATE
+
+
+def needs_track(desk: Desk) -> str | None:
+    """A track must be selected."""
+    if shown_plate(desk.document) is None:
+        return NO_PLATE
+    return None if selected_tracks(desk.document) else "No track is selected: click one or place one."
+
+
+def needs_two(desk: Desk) -> str | None:
+    """Two tracks must be selected."""
+    return None if len(selected_tracks(desk.document)) > 1 else "Select two tracks or more; Shift adds."
+
+
+def frame_of(desk: Desk) -> int:
+    """The frame of the desk as the files of the plate in view count."""
+    plate = shown_plate(desk.document)
+    return round(desk.workspace.frame) - (0 if plate is None else plate.offset)
+
+
+def chosen(desk: Desk) -> tuple[int, ...]:
+    """Ids of the selected tracks."""
+    return tuple(track.id for track in selected_tracks(desk.document))
+
+
+def _follow(way: Way, everything: bool = False) -> Callable[[Window], None]:
+    return lambda window: window.match.tracking.track(way, everything=everything)
+
+
+def _edit(
+    step: str, function: Callable[..., Document], *, at_frame: bool = False, **told: Any
+) -> Callable[[Window], None]:
+    """A run that does an edit to the selected tracks, on the frame of the desk where that matters."""
+
+    def run(window: Window) -> None:
+        desk = window.desk
+        desk.edit(step, function, chosen(desk), *((frame_of(desk),) if at_frame else ()), **told)
+
+    return run
+
+
+def _turn(step: str, field: str) -> Callable[[Window], None]:
+    """A run that turns something of the selected tracks on, or off when all have it on."""
+
+    def run(window: Window) -> None:
+        tracks = selected_tracks(window.desk.document)
+        on = not all(getattr(track, field) for track in tracks)
+        window.desk.edit(step, match_edits.set_tracks, tuple(t.id for t in tracks), **{field: on})
+
+    return run
+
+
+def _show_all(window: Window) -> None:
+    hidden = tuple(t.id for t in window.desk.document.tracks if t.hidden)
+    window.desk.edit("Show all tracks", match_edits.set_tracks, hidden, hidden=False)
+
+
+def _select(which: Callable[[Desk], tuple[int, ...]], step: str) -> Callable[[Window], None]:
+    return lambda window: window.desk.edit(step, match_edits.select_tracks, which(window.desk))
+
+
+def _all_ids(desk: Desk) -> tuple[int, ...]:
+    plate = shown_plate(desk.document)
+    return tuple(t.id for t in desk.document.tracks if plate is not None and t.plate_id == plate.id and not t.hidden)
+
+
+def _go_to_key(direction: int) -> Callable[[Window], None]:
+    def run(window: Window) -> None:
+        desk, now = window.desk, frame_of(window.desk)
+        keys = sorted({int(f) for t in selected_tracks(desk.document) for f in t.keys[:, 0]
+                       if (int(f) - now) * direction > 0}, key=lambda f: abs(f - now))
+        if keys:
+            desk.set_workspace(frame=desk.workspace.frame + keys[0] - now)
+
+    return run
+
+
+def _nudge(x: float, y: float) -> Callable[[Window], None]:
+    return _edit("Nudge", match_edits.nudge, at_frame=True, x=x, y=y)
+
+
+def _still(window: Window) -> None:
+    tracks, eye = selected_tracks(window.desk.document), window.match.eye
+    eye.hold_still(None if eye.still is not None or not tracks else tracks[-1].id)
+
+
+def _command(
+    name: str, label: str, tooltip: str, run: Callable[[Window], object], twin: str, undo: str | None = None,
+    enabled: Callable[[Desk], str | None] = needs_track, words: str = "", icon: str | None = None,
+    repeats: bool = False,
+) -> Command:
+    return Command(
+        f"match.{name}", label, tooltip, run, twin, "document" if undo else "workspace", undo, enabled,
+        scope="match", words=f"track matchmove {words}", icon=icon, repeats=repeats)
+
+
+def _edits(name: str) -> str:
+    return f"tools.match_edits.{name}"
+
+
+MATCH: tuple[Command, ...] = (
+    _command("forward", "Track forward", "Follows the selected tracks from this frame to the end of the plate.",
+             _follow("forward"), _TRACKING, "Track forward", words="follow pattern"),
+    _command("backward", "Track backward", "Follows the selected tracks from this frame to the start of the plate.",
+             _follow("backward"), _TRACKING, "Track backward", words="follow pattern"),
+    _command("next", "Track one frame on", "Follows the selected tracks to the next frame and goes there.",
+             _follow("next"), _TRACKING, "Track one frame on", words="step forward"),
+    _command("previous", "Track one frame back", "Follows the selected tracks to the frame before and goes there.",
+             _follow("previous"), _TRACKING, "Track one frame back", words="step backward"),
+    _command("between", "Track between keys", "Follows the selected tracks between the keys about this frame.",
+             _follow("between"), _TRACKING, "Track between keys", words="refine keys"),
+    _command("both", "Track both ways", "Follows the selected tracks from all their keys through the whole plate.",
+             _follow("both"), _TRACKING, "Track both ways", words="whole forward backward"),
+    _command("all", "Track everything", "Follows all tracks that are not locked or hidden through the whole plate.",
+             _follow("both", True), _TRACKING, "Track both ways", needs_plate, "whole all"),
+    _command("features", "Automatic features", f"Finds {FEATURES} corners, well spread, and follows them.",
+             lambda w: w.match.tracking.find(FEATURES), _TRACKING, "Automatic features", needs_plate, "auto detect"),
+    _command("key", "Key here", "Makes the place of the selected tracks on this frame a key, with a new pattern.",
+             _edit("Key track", match_edits.key, at_frame=True), _edits("key"), "Key track", words="re-key pattern"),
+    _command("remove_key", "Remove key", "Takes the key of the selected tracks on this frame away; the point stays.",
+             _edit("Remove key", match_edits.remove_keys, at_frame=True), _edits("remove_keys"), "Remove key"),
+    _command("clear_after", "Forget after here", "Takes away what the selected tracks have after this frame.",
+             _edit("Forget after", match_edits.clear, at_frame=True, after=True), _edits("clear"), "Forget after",
+             words="clear trim"),
+    _command("clear_before", "Forget before here", "Takes away what the selected tracks have before this frame.",
+             _edit("Forget before", match_edits.clear, at_frame=True, after=False), _edits("clear"), "Forget before",
+             words="clear trim"),
+    _command("split", "Split track", "Cuts the selected tracks in two before this frame.",
+             _edit("Split track", match_edits.split, at_frame=True), _edits("split"), "Split track", words="cut"),
+    _command("join", "Join tracks", "Makes one track of the selected ones, which follow one and the same point.",
+             _edit("Join tracks", match_edits.join), _edits("join"), "Join tracks", needs_two, "merge"),
+    _command("average", "Average tracks", "Adds a track of the mean of the selected ones, weighted by certainty.",
+             _edit("Average tracks", match_edits.average), _edits("average"), "Average tracks", needs_two, "mean"),
+    _command("smooth", "Smooth track", "Takes jitter out of the selected tracks over five frames; keys stay.",
+             _edit("Smooth track", match_edits.smooth), _edits("smooth"), "Smooth track", words="filter jitter"),
+    _command("delete", "Delete tracks", "Takes the selected tracks out of the document; undo brings them back.",
+             _edit("Delete tracks", match_edits.delete_tracks), _edits("delete_tracks"), "Delete tracks",
+             words="remove", icon="delete"),
+    _command("lock", "Lock tracks", "Keeps every tool off the selected tracks, or lets tools at them again.",
+             _turn("Lock tracks", "locked"), _edits("set_tracks"), "Lock tracks", words="unlock", icon="lock"),
+    _command("hide", "Hide tracks", "Leaves the selected tracks out of view and exports, or back in.",
+             _turn("Hide tracks", "hidden"), _edits("set_tracks"), "Hide tracks", words="disable enable",
+             icon="eye-off"),
+    _command("show_all", "Show all tracks", "Brings every hidden track back into view and exports.",
+             _show_all, _edits("set_tracks"), "Show all tracks", needs_plate, "unhide enable", "eye"),
+    _command("select_all", "Select all tracks", "Selects every track of the plate that is not hidden.",
+             _select(_all_ids, "Select tracks"), _edits("select_tracks"), "Select tracks", needs_plate),
+    _command("select_none", "Select no track", "Lets go of every selected track, so that nothing is selected.",
+             _select(lambda desk: (), "Select tracks"), _edits("select_tracks"), "Select tracks", needs_track,
+             "deselect"),
+    _command("next_key", "To the next key", "Goes to the next frame on which a selected track has a key.",
+             _go_to_key(1), "core.workspace.Workspace", words="jump"),
+    _command("previous_key", "To the key before", "Goes to the frame before this that has a key of a selected track.",
+             _go_to_key(-1), "core.workspace.Workspace", words="jump"),
+    _command("nudge_left", "Nudge left", "Moves the selected tracks a tenth of a pixel to the left on this frame.",
+             _nudge(-0.1, 0.0), _edits("nudge"), "Nudge", words="sub-pixel", repeats=True),
+    _command("nudge_right", "Nudge right", "Moves the selected tracks a tenth of a pixel to the right on this frame.",
+             _nudge(0.1, 0.0), _edits("nudge"), "Nudge", words="sub-pixel", repeats=True),
+    _command("nudge_up", "Nudge up", "Moves the selected tracks a tenth of a pixel up on this frame.",
+             _nudge(0.0, -0.1), _edits("nudge"), "Nudge", words="sub-pixel", repeats=True),
+    _command("nudge_down", "Nudge down", "Moves the selected tracks a tenth of a pixel down on this frame.",
+             _nudge(0.0, 0.1), _edits("nudge"), "Nudge", words="sub-pixel", repeats=True),
+    _command("still", "Hold still at track", "Holds the picture still at the active track, so that slips are seen.",
+             _still, _VIEW, enabled=needs_plate, words="stabilise stabilize lock view"),
+    _command("natural", "One to one", "Shows one pixel of the plate on one pixel of the screen.",
+             lambda w: w.match.eye.natural(), _VIEW, enabled=needs_plate, words="zoom 100 percent"),
+)
+
+PLATE_FILES: tuple[Command, ...] = (
+    Command("file.open_plate", "Open plate…", "Opens a sequence of frames or a movie to track; choose one frame.",
+            lambda w: w.match.doors.ask_plate(), "tools.match_edits.add_plate", "document", undo="Open plate",
+            icon="image", words="footage movie sequence background matchmove"),
+    Command("file.import_tracks", "Import tracks…", "Adds tracks of 3DEqualizer, Nuke, PFTrack, Boujou, SynthEyes, "
+            "mmSolver or JSON to the plate.", lambda w: w.match.doors.ask_import(), "tools.match_edits.add_tracks",
+            "document", undo="Import tracks", enabled=needs_plate, icon="import", words="2d load points"),
+    Command("file.export_tracks", "Export tracks…", "Writes the tracks of the plate; its suffix names the program.",
+            lambda w: w.match.doors.ask_export(), "core.formats.track_file.write_tracks", "file", enabled=needs_plate,
+            icon="export", words="2d save points nuke 3de blender"),
+)

@@ -1,0 +1,198 @@
+"""Tracking as a job: plain data on another thread, points shown as they are made, one step of history at the end."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from app.window.desk import Desk
+from app.window.jobs import Asked, Cancelled, Job, Progress
+from core.errors import UserError
+from core.formats.frame_decoder import FrameDecoder
+from core.formats.plate_file import PlateFrames
+from core.image.mix import mixed
+from core.image.plate import Plate
+from core.image.plate_view import plate_size
+from core.match.follow import Stretch, Way, stretch_of, with_found
+from core.match.outline import Mask, held_off
+from core.match.track import Track, TrackSettings
+from core.match.tracker import Step, Tracking
+from tools.match_edits import add_tracks, put_tracks, selected_tracks, shown_plate
+
+STEPS = {
+    "forward": "Track forward", "backward": "Track backward", "next": "Track one frame on",
+    "previous": "Track one frame back", "between": "Track between keys", "both": "Track both ways",
+}
+
+
+class Work:
+    """What a job needs of a plate and its marks; made on the thread of the window, used on another."""
+
+    def __init__(self, plate: Plate, root: Path | None, masks: tuple[Mask, ...]) -> None:
+        self.plate, self.root, self.masks = plate, root, masks
+
+    def run(
+        self, tasks: tuple[Stretch, ...], settings: TrackSettings, auto: int, steps: deque[Step], progress: Progress,
+        cancelled: Asked,
+    ) -> tuple[Track, ...]:
+        """Follow what is to be followed; every step goes to `steps` at once."""
+        plate = self.plate
+        width, height = plate_size(plate)
+        decoder = FrameDecoder()
+        source = PlateFrames(plate, decoder, root=self.root)
+        frames = range(min(t.frames[0] for t in tasks), max(t.frames[-1] for t in tasks) + 1) if tasks else plate.frames
+
+        def read(frame: int) -> NDArray[np.float32] | None:
+            if cancelled():
+                raise Cancelled
+            pixels = source.get(frame)
+            return None if pixels is None else mixed(pixels, plate.mix)
+
+        def hold(frame: int) -> NDArray[np.bool_] | None:
+            return held_off(self.masks, frame, height, width)
+
+        groups: dict[TrackSettings, list[Track]] = {}
+        for one in tasks:
+            own = one.task.settings or settings
+            group = next((known for known in groups if known == own), own)
+            groups.setdefault(group, []).append(one.task)
+        made: tuple[Track, ...] = ()
+        try:
+            for number, (own, tracks) in enumerate(groups.items() if groups else ((settings, []),)):
+                tracking = Tracking(read, frames, tuple(tracks), own, auto=auto, hold=hold)
+                for step in tracking.steps():
+                    steps.append(step)
+                    progress((number + step.done / step.total) / max(1, len(groups)))
+                made += tracking.tracks()
+            return made
+        finally:
+            source.close()
+            decoder.close()
+
+
+class MatchTracking(QObject):
+    """Begins tracking jobs of a desk and shows what they make.
+
+    made : points were made.
+    """
+
+    made = Signal()
+
+    def __init__(self, desk: Desk) -> None:
+        super().__init__(desk)
+        self.desk = desk
+        self.job: Job | None = None
+        self._steps: deque[Step] = deque()
+        self._tails: dict[int, list[tuple[int, NDArray[np.float64]]]] = {}
+        desk.jobs.changed.connect(self._listen)
+
+    @property
+    def running(self) -> bool:
+        """True while tracks are made."""
+        return self.job is not None and self.job in self.desk.jobs.running
+
+    def tails(self) -> list[NDArray[np.float64]]:
+        """Points (N, 2) of every track that is being made, in the order of frames."""
+        return [np.array([p for _, p in sorted(rows, key=lambda row: row[0])]) for rows in self._tails.values()]
+
+    def track(self, way: Way, *, everything: bool = False) -> None:
+        """Follow the selected tracks (or all that are free) from the frame of the desk."""
+        document, plate = self.desk.document, shown_plate(self.desk.document)
+        if plate is None:
+            raise UserError("There is no plate to track; open one from the File menu, or drop its folder here.")
+        self._one_at_a_time()
+        given = document.tracks if everything else selected_tracks(document)
+        tracks = [t for t in given if t.plate_id == plate.id and not (everything and (t.locked or t.hidden))]
+        if not tracks:
+            raise UserError("No track is selected; click one, or place one with Track point.")
+        locked = next((t.name for t in tracks if t.locked), None)
+        if locked is not None:
+            raise UserError(f"Track {locked} is locked; unlock it first.")
+        frame = round(self.desk.workspace.frame) - plate.offset
+        stretches = self._stretches(tracks, frame, way, plate, everything)
+        settings = tracks[-1].settings or TrackSettings()
+
+        def done(found: tuple[Track, ...]) -> None:
+            self._forget()
+            now = {t.id: t for t in self.desk.session.history.current.tracks}
+            by_id = {t.id: t for t in found}
+            ready = tuple(
+                with_found(now[i], by_id[i], s.made) for i, s in stretches.items() if i in now and i in by_id)
+            if ready and self.desk.edit(STEPS[way], put_tracks, ready) and way in ("next", "previous"):
+                self.desk.set_workspace(frame=self.desk.workspace.frame + (1.0 if way == "next" else -1.0))
+
+        self._start(STEPS[way], plate, tuple(stretches.values()), settings, 0, done)
+
+    def find(self, count: int) -> None:
+        """Find so many features by themselves and follow them through the plate."""
+        plate = shown_plate(self.desk.document)
+        if plate is None:
+            raise UserError("There is no plate to track; open one from the File menu, or drop its folder here.")
+        self._one_at_a_time()
+
+        def done(found: tuple[Track, ...]) -> None:
+            self._forget()
+            if not found:
+                self.desk.said.emit("No features were found; even out the contrast of a dark plate, or use less grain.")
+                return
+            if self.desk.edit("Automatic features", add_tracks, found, plate.id):
+                self.desk.said.emit(f"{len(found)} tracks were made by themselves.")
+
+        self._start("Automatic features", plate, (), TrackSettings(), count, done)
+
+    def _stretches(
+        self, tracks: list[Track], frame: int, way: Way, plate: Plate, lenient: bool
+    ) -> dict[int, Stretch]:
+        found: dict[int, Stretch] = {}
+        trouble: UserError | None = None
+        for track in tracks:
+            try:
+                found[track.id] = stretch_of(track, frame, way, plate.frames)
+            except UserError as error:
+                trouble = trouble or error
+        if trouble is not None and not (lenient and found):
+            raise trouble
+        return found
+
+    def _start(
+        self, name: str, plate: Plate, tasks: tuple[Stretch, ...], settings: TrackSettings, auto: int, done: Any
+    ) -> None:
+        path = self.desk.session.path
+        masks = tuple(m for m in self.desk.document.masks if m.plate_id == plate.id)
+        work = Work(plate, None if path is None else path.parent, masks)
+        steps: deque[Step] = deque()
+        self._forget()
+        self._steps = steps
+
+        def failed(error: Exception) -> None:
+            self._forget()
+            if isinstance(error, Cancelled):
+                self.desk.said.emit(f"{name}: cancelled; the tracks are as before.")
+            else:
+                self.desk.error(error)
+
+        self.job = self.desk.jobs.start(
+            name, lambda progress, cancelled: work.run(tasks, settings, auto, steps, progress, cancelled), done, failed,
+            self)
+
+    def _one_at_a_time(self) -> None:
+        if self.running:
+            raise UserError("Tracks are being made; wait for them, or cancel that first.")
+
+    def _listen(self) -> None:
+        if not self._steps:
+            return
+        while self._steps:
+            step = self._steps.popleft()
+            for number, point in zip(step.tracks, step.points, strict=True):
+                self._tails.setdefault(int(number), []).append((step.frame, point))
+        self.made.emit()
+
+    def _forget(self) -> None:
+        self._steps, self._tails = deque(), {}
+        self.made.emit()

@@ -1,0 +1,1 @@
+"""Tools of matchmoving in the plate."""
