@@ -71,6 +71,23 @@ def test_the_console_leaves_the_view_its_room_and_takes_the_keys_while_it_is_the
     hand.until(lambda: not window._console.isVisible() and window.viewport.isActive() and not typed_in.hasFocus())
 
 
+def test_larger_letters_get_a_wider_column(hand: Hand) -> None:
+    window = hand.window
+    window.resize(1600, 800)
+    hand.until(lambda: window.width() == 1600)
+    before = window.column.width()
+    window.crash.tell("Words beside an icon.")
+    try:
+        window.change_settings(text_size=20)
+        hand.until(lambda: window.column.width() >= window.column.widget().minimumSizeHint().width())
+        look = look_of()
+        beside = look.gap + look.grid + look.icon  # the icon
+        hand.until(lambda: window.crash.sentence.x() >= beside)
+    finally:
+        window.change_settings(text_size=12)
+    hand.until(lambda: abs(window.column.width() - before) <= 4)
+
+
 def test_closing_keeps_unsaved_work_for_the_next_start(opened: Opened, animal: Document) -> None:
     hand = opened(animal)
     hand.drag(BACK, ASIDE)
