@@ -89,6 +89,16 @@ def walks(hand: Hand, folder: Path) -> None:
     hand.rest()
 
 
+def colours(hand: Hand, folder: Path) -> None:
+    hand.window.pose_side.look.heat.enter("strain")
+    hand.rest()
+
+
+def side_by_side(hand: Hand, folder: Path) -> None:
+    hand.window.pose_side.look.sides.enter("SSD · SI · PSD · WPSD")
+    hand.rest()
+
+
 STEPS = (
     Step("Open the rig",
          "`filoplume demo pose` writes `out/pose.filo`; `filoplume out/pose.filo` opens it in the craft **Pose**. Rigs "
@@ -109,6 +119,13 @@ STEPS = (
     Step("Walk there",
          "Under **Graph** choose *walk to a pose*: it plots how fast the point moves that the sculpt moves most. Where "
          "the motion breaks, a red line says *kink*.", walks),
+    Step("See what it does to the skin",
+         "Set **Colours** to *strain*: where edges are longer than at rest the surface is orange, where they are "
+         "shorter it is blue, and the ramp in the corner says how much. It goes along while you pose.", colours),
+    Step("Compare",
+         "Set **Side by side** to *SSD · SI · PSD · WPSD*: the same pose by the skin alone, by shapes, by the pose "
+         "space and weighted by the skin, with one range of colours. You can pose in any of the four. Set both to "
+         "*plain* and *off* to go on.", side_by_side),
 )
 
 

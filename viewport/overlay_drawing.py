@@ -23,7 +23,7 @@ HALO = (0.04, 0.04, 0.045, 0.42)  # under every line, so that it is seen on ligh
 HALO_WIDTH = 1.0  # pixels on each side
 MARKER_WIDTH = 1.5
 DASH = (6.0, 5.0)
-PLATE, PLATE_HALF, LETTER = (0.04, 0.04, 0.045, 0.72), 9.0, 7.0  # behind words; half its height, width of a letter
+PLATE, PLATE_HALF, LETTER = (0.04, 0.04, 0.045, 0.72), 9.5, 6.6  # behind words; half its height, width of a letter
 AXIS_COLORS: tuple[Byte3, Byte3, Byte3] = ((0xDB, 0x62, 0x59), (0x86, 0xB0, 0x81), (0x62, 0x95, 0xD6))
 AXIS_LENGTH, AXIS_MARGIN = 26.0, 44.0  # pixels
 MARK = 12  # floats: ends (4), shape (4), colour (4); see mark.vert
@@ -62,7 +62,7 @@ def marks(overlays: Sequence[Overlay], tones: Mapping[str, Byte3] = TONES, scale
 
 def _plate(label: Label, scale: float) -> list[float]:
     """A thick dark line behind words, about as long as they are."""
-    y, end = label.y - 4.5 * scale, label.x + LETTER * scale * len(label.words)
+    y, end = label.y - 6.5 * scale, label.x + LETTER * scale * len(label.words)
     return [label.x, y, max(end, label.x), y, 0.0, PLATE_HALF * scale, -1.0, 0.0, *PLATE]
 
 

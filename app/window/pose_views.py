@@ -30,6 +30,7 @@ from core.pose.heat import (
     error_heat,
     mask_heat,
     shape_heat,
+    shares_of,
     strain_heat,
     weight_heat,
 )
@@ -54,11 +55,13 @@ SIDES: dict[str, tuple[Method, ...]] = {
 }
 
 
-class _Shades(NamedTuple):
-    """A field ready to be drawn: places (V,) on its ramp, and its legend."""
+class _Shown(NamedTuple):
+    """The mesh by one method: its name, the scene and the place of its surface in it, and its field."""
 
-    values: Points
-    legend: Legend
+    name: str
+    scene: Scene
+    surface: Surface
+    heat: Heat | None
 
 
 class PoseViews(QObject):
@@ -103,16 +106,31 @@ class PoseViews(QObject):
         at = next((i for i, s in enumerate(scene.surfaces) if s.triangles is triangles), None)
         if at is None:
             return (Pane(scene),)
-        if not methods:
-            shades = self._shades(item, scene.surfaces[at].points, "")
-            surface = _shaded(scene.surfaces[at], shades)
-            return (Pane(_with(scene, at, surface), "", self._legend(item, shades)),)
-        return tuple(self._pane(scene, at, item, method) for method in methods)
+        surface = scene.surfaces[at]
+        if methods:
+            shown = [self._by(method, scene, surface, item) for method in methods]
+        else:
+            shown = [_Shown("", scene, surface, self._field(item, surface.points, ""))]
+        widest = max((one.heat for one in shown if one.heat is not None), key=lambda heat: heat.high, default=None)
+        return tuple(self._pane(one, at, item, widest) for one in shown)
 
-    def _pane(self, scene: Scene, at: int, item: MeshObject, method: Method) -> Pane:
+    def _pane(self, shown: _Shown, at: int, item: MeshObject, widest: Heat | None) -> Pane:
+        """One pane; fields side by side have one range, so that their colours can be compared."""
+        surface, heat, legend = shown.surface, shown.heat, None
+        if widest is not None:
+            legend = Legend(widest.title, widest.ticks, widest.signed)
+        elif self.heat == "weight" and _joint(item) is None:
+            legend = Legend("Click a joint to see its weights", ("0", "0.5", "1"))
+        if heat is not None and widest is not None and len(heat.values) == len(surface.points):
+            values = self.desk.session.evaluator.get(_shares, heat.values, low=widest.low, high=widest.high)
+            surface = surface._replace(values=values, ramp="signed" if widest.signed else "heat")
+        surfaces = shown.scene.surfaces
+        scene = shown.scene._replace(surfaces=(*surfaces[:at], surface, *surfaces[at + 1 :]))
+        return Pane(scene, shown.name, legend)
+
+    def _by(self, method: Method, scene: Scene, surface: Surface, item: MeshObject) -> _Shown:
         """The mesh by a method, without hair, which follows the usual one."""
-        bare, evaluator = scene._replace(coats=(), guides=()), self.desk.session.evaluator
-        name, correctives = LABELS[method], None
+        evaluator, name, correctives = self.desk.session.evaluator, LABELS[method], None
         if method != "skin" and item.correctives is not None:
             key = "method", item.id, method
             correctives = self._found(
@@ -120,21 +138,14 @@ class PoseViews(QObject):
                 method=method)
             if correctives is None:
                 correctives, name = item.correctives, f"{name} …"
-        shown = item.replace(correctives=correctives)
-        points = shown_points(shown, self.desk.workspace.frame, evaluator)
+        taken = item.replace(correctives=correctives)
+        points = shown_points(taken, self.desk.workspace.frame, evaluator)
         normals = skin_at_rest(item.mesh, evaluator).normals if points is item.mesh.points else \
             evaluator.get(_normals, item.mesh, points)
-        surface = scene.surfaces[at]._replace(points=points, normals=normals)
-        shades = self._shades(shown, points, method)
-        return Pane(_with(bare, at, _shaded(surface, shades)), name, self._legend(item, shades))
+        surface = surface._replace(points=points, normals=normals)
+        return _Shown(name, scene._replace(coats=(), guides=()), surface, self._field(taken, points, method))
 
-    def _legend(self, item: MeshObject, shades: _Shades | None) -> Legend | None:
-        """What the colours mean, or what is to be done so that there are some."""
-        if shades is None and self.heat == "weight" and _joint(item) is None:
-            return Legend("Click a joint to see its weights", ("0", "0.5", "1"))
-        return None if shades is None else shades.legend
-
-    def _shades(self, item: MeshObject, shown: Points, method: str) -> _Shades | None:
+    def _field(self, item: MeshObject, shown: Points, method: str) -> Heat | None:
         """The field of a mesh posed at `shown`; None where there is none, or not yet."""
         kind, rig, evaluator = self.heat, item.rig, self.desk.session.evaluator
         if kind is None or rig is None:
@@ -201,20 +212,6 @@ def _same(failed: tuple[Any, ...] | None, inputs: tuple[Any, ...]) -> bool:
     return failed is not None and all(a is b for a, b in zip(failed, inputs, strict=True))
 
 
-def _with(scene: Scene, at: int, surface: Surface) -> Scene:
-    return scene._replace(surfaces=(*scene.surfaces[:at], surface, *scene.surfaces[at + 1 :]))
-
-
-def _shaded(surface: Surface, shades: _Shades | None) -> Surface:
-    if shades is None or len(shades.values) != len(surface.points):
-        return surface
-    return surface._replace(values=shades.values, ramp="signed" if shades.legend.signed else "heat")
-
-
-def _drawn(heat: Heat) -> _Shades:
-    return _Shades(freeze(heat.shares()), Legend(heat.title, heat.ticks, heat.signed))
-
-
 def _normals(mesh: Mesh, points: Points) -> Points:
     normals: Points = freeze(mesh_normals(mesh, points))
     return normals
@@ -223,30 +220,39 @@ def _normals(mesh: Mesh, points: Points) -> Points:
 # as the evaluator remembers them
 
 
-def _mask(mesh: Mesh, mask: Points | None) -> _Shades:
-    return _drawn(mask_heat(np.zeros(len(mesh.points), np.float32) if mask is None else mask))
+def _kept(heat: Heat) -> Heat:
+    return heat._replace(values=freeze(heat.values))
 
 
-def _weight(rig: Rig, joint: str) -> _Shades:
-    return _drawn(weight_heat(rig, joint))
+def _shares(values: Points, low: float, high: float) -> Points:
+    shares: Points = freeze(shares_of(values, low, high))
+    return shares
 
 
-def _strain(mesh: Mesh, shown: Points, evaluator: Evaluator) -> _Shades:
-    return _drawn(strain_heat(mesh, evaluator.get(edge_vertices, mesh), shown))
+def _mask(mesh: Mesh, mask: Points | None) -> Heat:
+    return _kept(mask_heat(np.zeros(len(mesh.points), np.float32) if mask is None else mask))
 
 
-def _shape(mesh: Mesh, plain: Points, shown: Points) -> _Shades:
-    return _drawn(shape_heat(mesh, plain, shown))
+def _weight(rig: Rig, joint: str) -> Heat:
+    return _kept(weight_heat(rig, joint))
 
 
-def _error(mesh: Mesh, rig: Rig, sculpts: Correctives, correctives: Correctives | None) -> _Shades:
-    return _drawn(error_heat(mesh, rig, sculpts, correctives))
+def _strain(mesh: Mesh, shown: Points, evaluator: Evaluator) -> Heat:
+    return _kept(strain_heat(mesh, evaluator.get(edge_vertices, mesh), shown))
 
 
-def _delta(mesh: Mesh, rig: Rig, correctives: Correctives | None, pose: Pose, evaluator: Evaluator) -> _Shades:
+def _shape(mesh: Mesh, plain: Points, shown: Points) -> Heat:
+    return _kept(shape_heat(mesh, plain, shown))
+
+
+def _error(mesh: Mesh, rig: Rig, sculpts: Correctives, correctives: Correctives | None) -> Heat:
+    return _kept(error_heat(mesh, rig, sculpts, correctives))
+
+
+def _delta(mesh: Mesh, rig: Rig, correctives: Correctives | None, pose: Pose, evaluator: Evaluator) -> Heat:
     prepared = () if correctives is None else evaluator.get(prepare, correctives, rig)
-    return _drawn(delta_heat(mesh, rig, prepared, pose))
+    return _kept(delta_heat(mesh, rig, prepared, pose))
 
 
-def _condition(mesh: Mesh, rig: Rig, pose: Pose) -> _Shades:
-    return _drawn(condition_heat(rig, len(mesh.points), pose))
+def _condition(mesh: Mesh, rig: Rig, pose: Pose) -> Heat:
+    return _kept(condition_heat(rig, len(mesh.points), pose))

@@ -47,9 +47,11 @@ class Heat(NamedTuple):
         """True when the middle of the ramp means nothing."""
         return self.low < 0.0
 
-    def shares(self) -> Points:
-        """Places (V,) float32 on the ramp, 0 .. 1."""
-        return ((self.values - self.low) / (self.high - self.low)).clip(0.0, 1.0).astype(np.float32)
+
+def shares_of(values: Points, low: float, high: float) -> Points:
+    """Places (V,) float32, 0 .. 1, on a ramp from `low` to `high`."""
+    shares: Points = ((values - low) / (high - low)).clip(0.0, 1.0).astype(np.float32)
+    return shares
 
 
 def shape_heat(mesh: Mesh, plain: Points, shown: Points) -> Heat:

@@ -36,7 +36,7 @@ def test_shape_is_the_height_above_the_skin(rigged):
     assert found.values[:100] == pytest.approx(-0.001, abs=1e-6)
     assert found.signed
     assert found.ticks == ("−5 mm", "0", "5 mm")
-    assert found.shares()[100:] == pytest.approx(0.8, abs=1e-3)
+    assert heat.shares_of(found.values, found.low, found.high)[100:] == pytest.approx(0.8, abs=1e-3)
 
 
 def test_delta_is_the_length_of_what_is_added_before_the_skin(rigged):
@@ -83,7 +83,7 @@ def test_weights_sum_to_one_over_the_joints_and_a_mask_is_itself(rigged):
     total = sum(heat.weight_heat(rig, joint).values for joint in rig.skeleton.names)
     assert total == pytest.approx(1.0, abs=1e-5)
     mask = freeze(np.linspace(0, 1, len(mesh.points), dtype=np.float32))
-    assert np.array_equal(heat.mask_heat(mask).shares(), mask)
+    assert np.array_equal(heat.shares_of(heat.mask_heat(mask).values, 0.0, 1.0), mask)
 
 
 @pytest.mark.parametrize(("metres", "words"), [(0.0, "0"), (0.019, "2 cm"), (0.0013, "2 mm"), (1.5, "2 m")])
