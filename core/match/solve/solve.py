@@ -1,0 +1,372 @@
+"""The whole solve: from tracks to a camera path, its kind, and what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from core.errors import UserError
+from core.match.solve.bundle import POSE, TURN, Free, adjust, smooth_zoom
+from core.match.solve.first import Cameras, Grower, best_pairs, keyframes, rays, triangulated
+from core.match.solve.floor import noise_floor
+from core.match.solve.nodal import solve_nodal
+from core.match.solve.state import (
+    FOCAL,
+    FRAME_FOCAL,
+    K1,
+    Array,
+    Flags,
+    Observations,
+    Rows,
+    State,
+    bearings,
+    residuals,
+    start_lens,
+)
+from core.match.track import HAND, Track
+
+LEAST_TRACKS = 8
+NODAL_SURE, NODAL_MAYBE = 1.3, 3.0  # median residual over the noise: a turning camera explains it; it may
+ACCEPT = 1.25  # of the noise: the keyframes are explained
+WORSE = 1.15  # of the noise: something of the lens may be missing
+GAIN = 0.93  # of the median residual: a richer lens is worth its parameters
+MEDIAN = 1.1774  # median of the length of a normal vector in the plane
+FOCALS = (0.7, 1.0, 1.6, 2.8)  # of the width of the picture, where nobody knows
+OUTLIER = 4.5  # standard deviations
+WILD = 0.005  # of the width of the picture: noise no tracker makes
+HYPOTHESES = 6
+
+
+class Options(NamedTuple):
+    """focal : pixels, or None. free_focal : find it too. zoom : it changes from frame to frame.
+    distortion : find k1 too. nodal : the camera only turns."""
+
+    focal: float | None = None
+    free_focal: bool = False
+    zoom: bool = False
+    distortion: bool = False
+    nodal: bool = False
+
+
+AS_GIVEN = Options()
+
+
+class Solution(NamedTuple):
+    """A solved path.
+
+    state : F frames and P points; frames (F,) their numbers; tracks (P,) rows of the tracks given.
+    known : (F,) frames that have a camera. held : (P,) tracks that have a point. used : (N,) observations counted in.
+    kind : "free" or "nodal". noise : standard deviation of an axis the tracks have by themselves, whitened.
+    sigma : standard deviation of the whitened residuals of an axis. keys : rows of the keyframes.
+    free : what was found; the rest was given. said : words for the artist.
+    """
+
+    state: State
+    frames: Rows
+    known: Flags
+    held: Flags
+    used: Flags
+    observations: Observations
+    kind: str
+    noise: float
+    sigma: float
+    keys: tuple[int, ...]
+    size: tuple[int, int]
+    free: Free
+    said: tuple[str, ...]
+
+
+
+
+
+def observations_of(tracks: Sequence[Track]) -> tuple[Observations, Rows]:
+    """Observations of tracks and the numbers of their frames, (F,) rising.
+
+    The covariance of each is that of the tracker; where none is known (keys of a hand, other programs) it is 1 px^2.
+    """
+    frames = np.unique(np.concatenate([t.frames for t in tracks])) if tracks else np.zeros(0, np.int32)
+    rows, numbers, xy, covariance = [], [], [], []
+    for k, track in enumerate(tracks):
+        rows.append(np.searchsorted(frames, track.frames))
+        numbers.append(np.full(len(track.frames), k))
+        xy.append(track.points)
+        covariance.append(track.own)
+    if not rows:
+        raise UserError("There are no tracks to solve from; track some points first.")
+    order = np.argsort(np.concatenate(rows), kind="stable")
+    c = np.concatenate(covariance)[order]
+    hand = c[:, 0] <= 4.0 * HAND
+    if hand.mean() > 0.5:
+        c[:] = [1.0, 0.0, 1.0]
+    else:
+        c[hand] = np.median(c[~hand], axis=0)
+    c[:, [0, 2]] = np.maximum(c[:, [0, 2]], 1e-4)
+    limit = 0.95 * np.sqrt(c[:, 0] * c[:, 2])
+    c[:, 1] = np.clip(c[:, 1], -limit, limit)
+    # root U (upper) of the inverse covariance, U^T U = C^-1, in closed form
+    rest = c[:, 0] - c[:, 1] ** 2 / c[:, 2]
+    u00 = 1.0 / np.sqrt(rest)
+    root = np.stack([u00, -c[:, 1] / c[:, 2] * u00, 1.0 / np.sqrt(c[:, 2])], axis=1)
+    return Observations(
+        np.concatenate(rows)[order].astype(np.int32), np.concatenate(numbers)[order].astype(np.int32),
+        np.ascontiguousarray(np.concatenate(xy)[order], np.float64), np.ascontiguousarray(root),
+    ), frames.astype(np.int32)
+
+
+def solve(
+    observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options = AS_GIVEN,
+    progress: Callable[[str], None] = lambda words: None,
+) -> Solution:
+    """Cameras and points from observations of `tracks` tracks in frames (F,) of `size` pixels.
+
+    Raises
+    ------
+    UserError
+        There is no camera that explains the tracks, or it cannot be told; the message says why.
+    """
+    _check(observations, frames, tracks)
+    pixels = noise_floor(observations, len(frames))
+    if pixels > WILD * size[0]:
+        raise UserError(
+            f"The tracks jump about by {pixels:.0f} px from frame to frame as no camera moves points: they are not "
+            "tracks of one rigid scene."
+        )
+    unit = float(np.median(observations.root[:, 0]))
+    problem = _Problem(observations, frames, tracks, size, options, pixels * unit, pixels, progress)
+    if options.focal is not None or options.nodal:
+        guesses = [options.focal or float(size[0])]
+    else:
+        guesses = [share * size[0] for share in FOCALS]
+    best = min((problem.begin(focal) for focal in guesses), key=lambda start: start.doubt)
+    return problem.finish(best)
+
+
+def _check(observations: Observations, frames: Rows, tracks: int) -> None:
+    if len(frames) < 2:
+        raise UserError("The tracks are on one frame only; a camera needs two frames at least, better twenty.")
+    if not np.isfinite(observations.xy).all():
+        raise UserError("The tracks hold places that are not numbers; track them again.")
+    long = np.bincount(observations.track, minlength=tracks) >= 2
+    if long.sum() < LEAST_TRACKS:
+        raise UserError(
+            f"{int(long.sum())} tracks are seen on two frames or more; a camera needs {LEAST_TRACKS} at least, better "
+            "twenty, spread over the picture and over near and far."
+        )
+
+
+class _Start(NamedTuple):
+    """A beginning: doubt is the median residual over the noise, of keyframes."""
+
+    doubt: float
+    kind: str
+    cameras: Cameras
+    lens_columns: tuple[int, ...]
+    zoom: bool
+    said: tuple[str, ...]
+
+
+class _Problem:
+    def __init__(
+        self, observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
+        noise: float, pixels: float, progress: Callable[[str], None],
+    ) -> None:
+        self.observations, self.frames, self.tracks, self.size = observations, frames, tracks, size
+        self.options, self.noise, self.pixels, self.progress = options, noise, pixels, progress
+        self.keys = keyframes(observations, len(frames), tracks)
+        self.key_frames = frames[self.keys]
+        self.part = self._of_keyframes()
+
+    def _of_keyframes(self) -> Observations:
+        number = np.full(len(self.frames), -1, np.int32)
+        number[self.keys] = np.arange(len(self.keys))
+        part = self.observations.take(number[self.observations.frame] >= 0)
+        return part._replace(frame=number[part.frame])
+
+    def _doubt(self, state: State, part: Observations) -> float:
+        if not len(part.frame):
+            return np.inf
+        return float(np.median(np.linalg.norm(residuals(state, part), axis=1))) / MEDIAN / self.noise
+
+    # -- keyframes ----------------------------------------------------------------------------------------
+
+    def begin(self, focal: float) -> _Start:
+        """The best explanation of the keyframes that starts at a focal length."""
+        lens = start_lens(focal, *self.size)
+        free = self.options.focal is None or self.options.free_focal
+        nodal = self._nodal(lens, free)
+        if nodal is not None and (nodal.doubt < NODAL_SURE or self.options.nodal):
+            return nodal
+        found = self._free(lens, free)
+        if nodal is not None and nodal.doubt < NODAL_MAYBE and (found is None or found.doubt > ACCEPT):
+            moves = "The camera hardly moves: it is solved as one that only turns. If it did move, this path is wrong."
+            return nodal._replace(said=(*nodal.said, moves))
+        if found is None:
+            return _Start(np.inf, "none", Cameras(_nowhere(lens), np.zeros(0, bool), np.zeros(0, bool)), (), False, ())
+        return found
+
+    def _nodal(self, lens: Array, free: bool) -> _Start | None:
+        self.progress("does the camera only turn?")
+        best: _Start | None = None
+        smooth = smooth_zoom(self.key_frames)
+        for columns, zoom in self._lenses(free):
+            if best is not None and best.doubt < WORSE and not (self.options.zoom and zoom):
+                continue
+            done = solve_nodal(
+                self.part, len(self.keys), self.tracks, lens, self.pixels, scale=2.5 * self.noise,
+                lens_columns=columns, zoom=smooth if zoom else None,
+            )
+            if done is None:
+                continue
+            doubt = self._doubt(done.state, self.part)
+            if best is None or doubt < GAIN * best.doubt or (self.options.zoom and zoom):
+                cameras = Cameras(done.state, np.ones(len(self.keys), bool), np.ones(self.tracks, bool))
+                best = _Start(doubt, "nodal", cameras, columns, zoom, self._changed(done.state, columns, zoom, free))
+        return best
+
+    def _lenses(self, free: bool) -> list[tuple[tuple[int, ...], bool]]:
+        """What of the lens may be free, and whether it zooms: what was asked for, then richer ones."""
+        asked = ((FOCAL,) if free else ()) + ((K1,) if self.options.distortion else ())
+        tries = [(asked, False), (tuple(sorted({FOCAL, *asked})), False)]
+        tries.append((tuple(c for c in asked if c != FOCAL), True))
+        tries.append((tuple(sorted({FOCAL, K1, *asked})), False))
+        return [one for k, one in enumerate(tries) if one not in tries[:k]]
+
+    def _changed(self, state: State, columns: tuple[int, ...], zoom: bool, free: bool) -> tuple[str, ...]:
+        """Words where more was found than was asked for."""
+        said = []
+        focal = float(np.exp(state.lens[FOCAL]))
+        if zoom and not self.options.zoom:
+            said.append("The focal length changes over the shot: it was solved with a zoom, which nobody asked for.")
+        elif FOCAL in columns and not free:
+            said.append(f"The focal length given does not fit these tracks; {focal:.1f} px was found instead.")
+        if K1 in columns and not self.options.distortion:
+            said.append(f"The lens bends lines: k1 {state.lens[K1]:+.4f} was found, which nobody asked for.")
+        return tuple(said)
+
+    def _free(self, lens: Array, free: bool) -> _Start | None:
+        self.progress("looking for the first pair of frames")
+        table = rays(self.part, lens, len(self.keys), self.tracks)
+        noise = self.pixels / float(np.exp(lens[FOCAL]))
+        grower = Grower(self.part, lens, table, noise, self.noise)
+        pairs = best_pairs(table, noise)
+        best: _Start | None = None
+        for _, start in grower.hypotheses(pairs)[:HYPOTHESES]:
+            self.progress("finding the keyframes")
+            cameras = grower.grow(start)
+            found = self._richer(grower, cameras, free)
+            missing = 1.0 - float(found.cameras.known.mean())
+            found = found._replace(doubt=found.doubt * (1.0 + missing))
+            if best is None or found.doubt < best.doubt:
+                best = found
+            if best.doubt < ACCEPT:
+                break
+        return best
+
+    def _key_doubt(self, cameras: Cameras) -> float:
+        rows = cameras.known[self.part.frame] & cameras.held[self.part.track]
+        return self._doubt(cameras.state, self.part.take(rows))
+
+    def _richer(self, grower: Grower, cameras: Cameras, free: bool) -> _Start:
+        """The lens with no more parameters than the tracks ask for."""
+        best: _Start | None = None
+        for columns, zoom in self._lenses(free):
+            if best is not None and best.doubt < WORSE and not (self.options.zoom and zoom):
+                continue
+            smooth = smooth_zoom(self.key_frames[cameras.known]) if zoom else None
+            other = grower.adjusted(cameras, columns, smooth) if columns or zoom else cameras
+            doubt = self._key_doubt(other)
+            if best is None or doubt < GAIN * best.doubt or (self.options.zoom and zoom):
+                best = _Start(doubt, "free", other, columns, zoom, self._changed(other.state, columns, zoom, free))
+        assert best is not None
+        return best
+
+    # -- all frames ---------------------------------------------------------------------------------------
+
+    def finish(self, start: _Start) -> Solution:
+        """Cameras of all frames from those of the keyframes, without the tracks that do not fit."""
+        if start.doubt == np.inf:
+            raise UserError(
+                "No camera explains these tracks: no two frames share enough of them at different places. Track more "
+                "points that stay fixed in the scene, near and far, over more frames."
+            )
+        self.progress("finding the frames between")
+        nodal = start.kind == "nodal"
+        state, known, held = self._between(start, nodal)
+        observations, count = self.observations, len(self.frames)
+        zoom = smooth_zoom(self.frames) if start.zoom else None
+        columns = (TURN if nodal else POSE) + ((FRAME_FOCAL,) if zoom is not None else ())
+        free = Free(frame=columns, lens=start.lens_columns, zoom=zoom)
+        least = 1e-6 if nodal else 1e-12
+        used = known[observations.frame] & held[observations.track]
+        self.progress("adjusting all frames together")
+        spread = max(self.noise, self._spread(state, observations, used))
+        state = adjust(
+            state, observations.take(used), free, scale=2.5 * spread, tolerance=1e-4, least_damping=least, iterations=20
+        ).state
+        for _ in range(2):
+            spread = max(self.noise, self._spread(state, observations, used))
+            error = np.linalg.norm(residuals(state, observations), axis=1) / spread
+            dof = np.maximum(2.0 * np.bincount(observations.track[used], minlength=self.tracks) - 3.0, 1.0)
+            chi = np.bincount(
+                observations.track[used], weights=np.minimum(error[used], 50.0) ** 2, minlength=self.tracks) / dof
+            held = held & (chi < 1.5 + 5.0 * np.sqrt(2.0 / dof))
+            used = known[observations.frame] & held[observations.track] & (error < OUTLIER)
+            seen = np.bincount(observations.track[used], minlength=self.tracks)
+            held = held & (seen >= 2)
+            used &= held[observations.track]
+            state = adjust(state, observations.take(used), free, tolerance=1e-6, least_damping=least).state
+        enough = np.bincount(observations.frame[used], minlength=count) >= 4
+        known = known & enough
+        used &= known[observations.frame]
+        final = residuals(state, observations.take(used))
+        freedom = 2 * int(used.sum()) - len(columns) * int(known.sum()) - 3 * int(held.sum())
+        sigma = float(np.sqrt((final**2).sum() / max(1, freedom)))
+        return Solution(
+            state, self.frames, known, held, used, observations, start.kind, self.noise, sigma, tuple(self.keys),
+            self.size, free, start.said,
+        )
+
+    def _spread(self, state: State, observations: Observations, used: Flags) -> float:
+        return float(np.median(np.linalg.norm(residuals(state, observations.take(used)), axis=1))) / MEDIAN
+
+    def _between(self, start: _Start, nodal: bool) -> tuple[State, Flags, Flags]:
+        """Poses between keyframes by interpolation, then each moved to where it sees the points it should."""
+        cameras = start.cameras
+        at = np.asarray(self.keys)[cameras.known].astype(float)
+        turns = cameras.state.rotation[cameras.known]
+        count = len(self.frames)
+        inside = np.clip(np.arange(count), at[0], at[-1])
+        rotation = Slerp(at, Rotation.from_matrix(turns))(inside).as_matrix() if len(at) > 1 else turns.repeat(count, 0)
+        centres = -np.einsum("fji,fj->fi", turns, cameras.state.translation[cameras.known])
+        centre = np.stack([np.interp(inside, at, centres[:, k]) for k in range(3)], axis=1)
+        translation = -np.einsum("fij,fj->fi", rotation, centre)
+        zoom = np.interp(inside, at, cameras.state.focal[cameras.known])
+        state = State(rotation, translation, cameras.state.points, zoom, cameras.state.lens)
+        held = cameras.held
+        scale = 2.5 * max(self.noise, min(start.doubt, 10.0) * self.noise)
+        columns = TURN if nodal else POSE
+        reach = np.flatnonzero((np.arange(count) >= at[0]) & (np.arange(count) <= at[-1]))
+        known = np.zeros(count, bool)
+        known[reach] = True
+        for _ in range(2):  # frames beyond the keyframes follow from their neighbours
+            rows = self.observations.take(held[self.observations.track])
+            state = adjust(state, rows, Free(frame=columns, points=False), scale=scale, tolerance=1e-3).state
+            known[:] = np.bincount(rows.frame, minlength=count) >= 4
+            if nodal:
+                break
+            flat = np.full((count, self.tracks, 2), np.nan)
+            bent = bearings(state.lens, state.focal[self.observations.frame], self.observations.xy)[:, :2]
+            flat[self.observations.frame, self.observations.track] = bent
+            points, least = triangulated(state.rotation[known], state.translation[known], flat[known])
+            noise = self.pixels / float(np.exp(state.lens[FOCAL]))
+            new = ~held & (least > noise**2)
+            state, held = state._replace(points=np.where(new[:, None], points, state.points)), held | new
+        return state, known, held
+
+
+def _nowhere(lens: Array) -> State:
+    return State(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), lens)
+
