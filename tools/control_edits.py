@@ -108,10 +108,11 @@ def edit_control(document: Document, mesh_id: int, control: str, **changes: Any)
 
 
 def change_control(
-    document: Document, mesh_id: int, name: str, to: str, low: float, high: float, rest: float
+    document: Document, mesh_id: int, name: str, to: str = "", low: float = 0.0, high: float = 0.0, rest: float = 0.0
 ) -> Document:
-    """As :func:`edit_control`, of the name (kept where `to` is empty), the range and the rest at once."""
-    return edit_control(document, mesh_id, name, name=to.strip() or name, low=low, high=high, rest=rest)
+    """As :func:`edit_control`, of name, range and rest; an empty name and an empty range stay as they are."""
+    changes: dict[str, Any] = {} if low == high else {"low": low, "high": high, "rest": rest}
+    return edit_control(document, mesh_id, name, name=to.strip() or name, **changes)
 
 
 def remove_control(document: Document, mesh_id: int, name: str) -> Document:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from app.window.ask_text import ask_text
 from app.window.commands import CRAFT_SCOPES, Command, Window
 from core.falloff import SHAPES
+from core.field import fields_of
 from tools.groom.actions import ACTIONS, Action
 from tools.pose.actions import ACTIONS as POSE_ACTIONS
 from tools.pose.actions import PoseAction
@@ -100,9 +102,18 @@ def _needs_rig(desk: Desk) -> str | None:
 
 
 def _act_or_ask(action: PoseAction) -> Callable[[Window], object]:
+    if action.asks is None:
+        return _act(action.name)
     if action.asks == "file":
         return lambda window: window.import_sculpt()
-    return _act(action.name)
+    asked = action.asks
+    label = fields_of(action.Params)[asked].label
+
+    def run(window: Window) -> None:
+        desk = window.desk
+        ask_text(window, action.label, label, lambda text: desk.attempt(desk.session.act, action.name, **{asked: text}))
+
+    return run
 
 
 def pose_action_command(action: PoseAction) -> Command:

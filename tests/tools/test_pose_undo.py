@@ -134,7 +134,7 @@ ARGUMENTS = {
     "add_pad": lambda s: (s.name, s.name), "add_joint_control": lambda s: (s.name, s.joint),
     "add_geometry_control": lambda s: (s.name, s.of([0, 1], [], [999])), "add_masked_control": lambda s: (s.name,),
     "edit_control": lambda s: (s.control, s.of({"name": "renamed"}, {"low": -2.0}, {"high": -3.0}, {"rest": 0.25})),
-    "change_control": lambda s: (s.control, s.of("", "called"), s.of(0.0, -1.0), 1.0, s.of(0.0, 0.5)),
+    "change_control": lambda s: (s.control, s.of("", "called"), s.of(0.0, -1.0, 1.0), 1.0, s.of(0.0, 0.5)),
     "remove_control": lambda s: (s.control,),
     "limit_joint": lambda s: (s.joint, (-0.3, -0.3, s.of(-0.3, 9.0)), (0.3, 0.3, 0.3)),
     "constrain_joint": lambda s: (s.joint, s.joint, s.of("aim", "point", "orient"), s.number(0, 1)),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QInputDialog
 from pytestqt.qtbot import QtBot
 
 from app.window import file_actions
@@ -95,6 +96,21 @@ def test_without_a_rig_they_say_why_not(host: Host) -> None:
     for name in ACTIONS:
         assert not host.commands.run(f"pose.{name}")
     assert set(host.said) == {"There is no rig yet: open a mesh with a skeleton or blend shapes first."}
+
+
+@pytest.mark.parametrize("name", [n for n, action in ACTIONS.items() if action.asks in ("name", "to")])
+def test_a_name_is_asked_for(name: str, rigged: Host) -> None:
+    session = rigged.desk.session
+    assert rigged.commands.run(f"pose.{name}")
+    assert session.history.names == ("New",), "nothing is done before there is an answer"
+    (dialog,) = rigged.findChildren(QInputDialog)
+    assert dialog.windowTitle() == ACTIONS[name].label
+    dialog.setTextValue("mood")
+    dialog.accept()
+    assert session.history.undo_name == ACTIONS[name].step
+    rig = session.document.meshes[0].rig
+    assert rig is not None
+    assert "mood" in [control.name for control in rig.controls]
 
 
 def test_a_sculpt_is_asked_for_and_imported(opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

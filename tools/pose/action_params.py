@@ -188,13 +188,14 @@ class EditControlParams(Record):
     name: Annotated[str, field("Name", "Name of the abstract control to change; empty takes the one added last.")] = ""
     to: Annotated[str, field("New name", "What it should be called; empty keeps the name that it has.")] = ""
     low: Annotated[float, field(
-        "Lowest", "Where its range ends below; sculpts and poses stay as they are.", "", (-10, 10),
+        "Lowest", "Where its range ends below; the same as above keeps the range it has.", "", (-10, 10),
         (-1e9, 1e9))] = 0.0
     high: Annotated[float, field(
-        "Highest", "Where its range ends above; sculpts and poses stay as they are.", "", (-10, 10),
-        (-1e9, 1e9))] = 1.0
+        "Highest", "Where its range ends above; the same as below keeps the range it has.", "", (-10, 10),
+        (-1e9, 1e9))] = 0.0
     rest: Annotated[float, field(
-        "Rest", "Where it stands at rest, between its lowest and its highest.", "", (-10, 10), (-1e9, 1e9))] = 0.0
+        "Rest", "Where it stands at rest within its new range, between lowest and highest.", "", (-10, 10),
+        (-1e9, 1e9))] = 0.0
 
 
 class ControlParams(Record):

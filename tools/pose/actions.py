@@ -99,7 +99,7 @@ class PoseAction(NamedTuple):
     name, label, icon : id, words, file in resources/icons without suffix or None. tooltip : what it does and when.
     step : name of the undo step. edit : ``edit(document, mesh_id, *arguments)``, the same for scripts.
     arguments : of the edit, from what the mesh is like and the parameters.
-    Params : what it can be told. asks : one of them that has no usual value (a file), for a window to ask for.
+    Params : what it can be told. asks : one of them that a window asks for (a file, a name).
     """
 
     name: str
@@ -270,22 +270,23 @@ _TABLE: tuple[PoseAction, ...] = (
         "Blur mask", skin_edits.edit_mask, _mask("blur"), told.TimesParams, "smooth"),
     PoseAction(
         "add_dial", "Add dial", "Gives the rig a dial: a named number with a range, for sculpts to read.",
-        "Add dial", control_edits.add_dial, lambda s, p: (p.name, p.low, p.high, p.rest), told.DialParams, "plus"),
+        "Add dial", control_edits.add_dial, lambda s, p: (p.name, p.low, p.high, p.rest), told.DialParams, "plus",
+        asks="name"),
     PoseAction(
         "add_pad", "Add pad", "Gives the rig two dials that make a pad, such as valence and arousal.",
         "Add pad", control_edits.add_pad, lambda s, p: (p.across, p.up, p.reach), told.PadParams, "plus"),
     PoseAction(
         "add_joint_control", "Add joint switch", "Makes the movement of the active joint a number for sculpts to read.",
         "Add switch", control_edits.add_joint_control,
-        lambda s, p: (p.name, s.selection[-1], told.AXES[p.axis], p.travel), told.MovedParams, "plus"),
+        lambda s, p: (p.name, s.selection[-1], told.AXES[p.axis], p.travel), told.MovedParams, "plus", asks="name"),
     PoseAction(
         "add_geometry_control", "Add geometry control", "Makes the movement of what is masked a number for sculpts.",
         "Add geometry control", control_edits.add_masked_control,
-        lambda s, p: (p.name, told.AXES[p.axis], p.travel), told.MovedParams, "plus"),
+        lambda s, p: (p.name, told.AXES[p.axis], p.travel), told.MovedParams, "plus", asks="name"),
     PoseAction(
         "edit_control", "Edit control", "Gives an abstract control another name, range or place at rest.",
         "Edit control", control_edits.change_control,
-        lambda s, p: (s.control(p.name), p.to, p.low, p.high, p.rest), told.EditControlParams),
+        lambda s, p: (s.control(p.name), p.to, p.low, p.high, p.rest), told.EditControlParams, asks="to"),
     PoseAction(
         "delete_control", "Delete control", "Deletes an abstract control that no sculpt reads; poses forget it.",
         "Delete control", control_edits.remove_control, lambda s, p: (s.control(p.name),), told.ControlParams,
