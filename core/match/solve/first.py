@@ -88,10 +88,10 @@ def _relative(a: Array, b: Array, noise: float) -> Iterator[tuple[Array, Array]]
     plane, _ = cv2.findHomography(a, b, cv2.RANSAC, 3.0 * noise)
     if plane is not None and abs(np.linalg.det(plane)) > 1e-9:
         _, turns, shifts, _ = cv2.decomposeHomographyMat(plane, np.eye(3))
-        for turn, move in zip(turns, shifts, strict=True):
+        for rotation, move in zip(turns, shifts, strict=True):
             length = float(np.linalg.norm(move))
             if length > 1e-6:
-                yield np.asarray(turn, np.float64), np.asarray(move, np.float64).ravel() / length
+                yield np.asarray(rotation, np.float64), np.asarray(move, np.float64).ravel() / length
 
 
 def triangulated(rotation: Array, translation: Array, table: Array) -> tuple[Array, Array]:

@@ -156,7 +156,7 @@ def test_the_command_solves_a_file_of_tracks_and_says_what_it_found(tmp_path):
     source = tmp_path / "tracks.json"
     source.write_text(json.dumps({"size": SIZE, "frames": [1001, 1012], "tracks": tracks}))
     out = tmp_path / "out.usda"
-    cli = build(("solve", "track"))
+    cli = build(("solve", "bench"))
     done = CliRunner().invoke(cli, ["solve", str(source), "--focal-px", "1600", "-o", str(out), "--json"])
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
