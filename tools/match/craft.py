@@ -17,13 +17,14 @@ from core.image.plate import Plate
 from core.image.plate_view import pixels_per_pixel, plate_points, plate_size, view_points
 from core.match.outline import Mask
 from core.match.track import PlaneTrack, Track
-from tools.match_edits import shown_plate
+from tools.match_edits import place_at, shown_plate
 from tools.tool import Ground, Pointer, Sight, Tool
 
 if TYPE_CHECKING:
     from tools.session import Session
 
 Array = NDArray[np.float64]
+REACH = 10.0  # pixels of the view from a track that a press takes hold of it
 FIELDS = ("tracks", "track_selection", "planes", "masks")
 
 
@@ -123,6 +124,22 @@ class MatchCraft:
     def preparation(self, session: Session) -> Callable[[], object] | None:
         """Nothing to prepare."""
         return None
+
+
+def track_near(ground: MatchGround, pointer: Pointer) -> Track | None:
+    """The track of the plate shown that is nearest to a pointer, within reach; selected ones first."""
+    best: tuple[bool, float] | None = None
+    found: Track | None = None
+    for track in ground.marks.tracks:
+        place = place_at(track, ground.frame) if track.plate_id == ground.plate.id and not track.hidden else None
+        if place is None:
+            continue
+        x, y = ground.in_view(place)[0]
+        away = float(np.hypot(x - pointer.x, y - pointer.y))
+        rank = (track.id not in ground.marks.selection, away)
+        if away <= REACH and (best is None or rank < best):
+            best, found = rank, track
+    return found
 
 
 def _marks(document: Document) -> Marks:

@@ -12,11 +12,10 @@ from core.field import field
 from core.match.edits import key_track
 from core.match.track import Track, TrackSettings, keyed_track
 from core.overlay import Circle, Overlays, Polyline
-from tools.match.craft import Marks, MatchGround
+from tools.match.craft import REACH, Marks, MatchGround, track_near
 from tools.match_edits import free_track, place_at, selected_with, with_track
 from tools.tool import Pointer, Stroke, Tool, Turn
 
-REACH = 10.0  # pixels of the view from a track that a press takes hold of it
 STILL = 2.0  # pixels of the view that a hand may shake in a click
 
 
@@ -115,34 +114,18 @@ class TrackPoint(Tool[PointParams]):
     def hover(self, ground: MatchGround, pointer: Pointer) -> Overlays:
         """The track that a press would take hold of, or the boxes of a new one."""
         near = track_near(ground, pointer)
-        if near is not None:
-            place = place_at(near, ground.frame)
+        place = None if near is None else place_at(near, ground.frame)
+        if place is not None:
             x, y = ground.in_view(place)[0]
             return (Circle(float(x), float(y), REACH, "accent"),)
         place = ground.place(pointer)
         if not ground.inside(place):
             return ()
-        return tuple(
-            Polyline(ground.in_view(place + half * SQUARE), tone, 1.0, closed=True, dashed=dashed)
-            for half, tone, dashed in (
-                (0.5 * self.params.pattern, "accent", False),
-                (0.5 * self.params.pattern + self.params.search, "faint", True)))
+        pattern = 0.5 * self.params.pattern
+        return (
+            Polyline(ground.in_view(place + pattern * SQUARE), "accent", 1.0, closed=True),
+            Polyline(ground.in_view(place + (pattern + self.params.search) * SQUARE), "faint", 1.0, closed=True,
+                     dashed=True))
 
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-
-
-def track_near(ground: MatchGround, pointer: Pointer) -> Track | None:
-    """The track of the plate shown that is nearest to a pointer, within reach; selected ones first."""
-    best: tuple[bool, float] | None = None
-    found: Track | None = None
-    for track in ground.marks.tracks:
-        place = place_at(track, ground.frame) if track.plate_id == ground.plate.id and not track.hidden else None
-        if place is None:
-            continue
-        x, y = ground.in_view(place)[0]
-        away = float(np.hypot(x - pointer.x, y - pointer.y))
-        rank = (track.id not in ground.marks.selection, away)
-        if away <= REACH and (best is None or rank < best):
-            best, found = rank, track
-    return found
