@@ -298,8 +298,16 @@ def _pose(name: str, controls: Controls, rig: Rig, where: str) -> Pose:
             raise UserError(f'{where}: {control!r} is a joint; give it as {control!r}: {{"rotate": [x, y, z]}}.')
         else:
             _check_size((value,), control, where)
+            _check_dial(control, rig, where)
             numbers[control] = float(value)
     return Pose(name=name, rotations=rotations, translations=translations, numbers=numbers)
+
+
+def _check_dial(name: str, rig: Rig, where: str) -> None:
+    kind = next(control.kind for control in rig.controls if control.name == name)
+    if kind != "number":
+        what = "the joint" if kind == "joint" else "the piece of geometry"
+        raise UserError(f"{where}: {name!r} is how far {what} it follows has moved; pose the joints instead.")
 
 
 def _check_size(values: tuple[float, ...], control: str, where: str) -> None:

@@ -24,7 +24,7 @@ from core.pose.pose import Pose, moved_controls
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
 from core.pose.rig import Rig
-from core.pose.synthesis import Prepared, evaluate, prepare, prepare_layer, run_weights
+from core.pose.synthesis import Prepared, evaluate, prepare, prepare_layer, run_weights, whole_pose
 from core.record import freeze
 from core.transform import Array
 
@@ -83,6 +83,7 @@ def add_sculpt(
     target : (V, 3), the surface as sculpted, object space.
     options : fields of a new :class:`PoseSpace`.
     """
+    pose = whole_pose(pose, rig, points)
     controls = moved_controls(pose, rests(rig))
     if not controls:
         raise Refusal("duplicate", (REST_NAME, pose.name))
@@ -199,6 +200,7 @@ def moved_pose(
     """
     at, k = place_of(correctives, name)
     layer = correctives.layers[at]
+    pose = whole_pose(pose, rig, points).replace(name=name)
     alone = layer.replace(
         space=layer.space.replace(samples=(PoseSample(pose=pose),), anchors=(), kernel="gaussian", rest_falloffs={}),
         kind="pose-space", enabled=True, moved=freeze(layer.moved[k : k + 1] | True),
@@ -207,7 +209,7 @@ def moved_pose(
     targets = layer.targets.copy()
     targets[k] = surface[layer.vertices]
     samples = list(layer.space.samples)
-    samples[k] = samples[k].replace(pose=pose.replace(name=name))
+    samples[k] = samples[k].replace(pose=pose)
     changed = layer.replace(space=layer.space.replace(samples=tuple(samples)), targets=freeze(targets))
     out: Correctives = correctives.replace(
         layers=(*correctives.layers[:at], changed, *correctives.layers[at + 1 :]))

@@ -21,7 +21,7 @@ from core.pose.refusal import Refusal
 from core.pose.rig import Rig
 from core.pose.skinning import skin_matrices_of
 from core.pose.solve import TOO_CLOSE, solve, weights_at
-from core.pose.synthesis import Prepared, corrected, felt, prepare_layer, run_keys, skin_shares
+from core.pose.synthesis import Prepared, corrected, felt, prepare_layer, run_keys, skin_shares, whole_pose
 from core.record import freeze
 from core.transform import Array
 
@@ -79,7 +79,7 @@ def build(
     """
     groups: dict[tuple[str, ...], list[Sculpt]] = {}
     at_rest = rests(rig)
-    for sculpt in sculpts:
+    for sculpt in [s._replace(pose=whole_pose(s.pose, rig, points)) for s in sculpts]:
         groups.setdefault(moved_controls(sculpt.pose, at_rest), []).append(sculpt)
     if () in groups:
         raise Refusal("duplicate", (REST_NAME, *(s.pose.name for s in groups[()])))

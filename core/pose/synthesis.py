@@ -248,6 +248,11 @@ def felt(pose: Pose, rig: Rig, mesh_points: NDArray[np.float32], local: Array) -
     return with_numbers
 
 
+def whole_pose(pose: Pose, rig: Rig, mesh_points: NDArray[np.float32]) -> Pose:
+    """The pose with the numbers that follow from its joints, so that a pose space can read them of it."""
+    return felt(pose, rig, mesh_points, local_of_pose(rig.skeleton, pose))
+
+
 @njit(
     void(NumbaArray(float32, 2, "C", readonly=True), float32[:, ::1], int64[::1],
          NumbaArray(boolean, 1, "C", readonly=True), NumbaArray(int32, 1, "C", readonly=True), float32[:, ::1],

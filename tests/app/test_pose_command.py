@@ -174,6 +174,8 @@ def test_dials_of_ones_own_and_what_is_read_of_a_joint(folder):
         {"name": "strained", "controls": {"strain": 1.0}, "sculpt": "bent.obj", "falloff": {"strain": 0.5}},
         {**POSES[0], "falloff": {"elbow": [60, 20]}},
     ]
+    follows = [{"name": "odd", "controls": {"reach": 1.0}, "sculpt": None}]
+    assert "the joint it follows" in build(folder, follows, "-o", folder / "dials.filo", controls=controls).stderr
     done = build(folder, poses, "-o", folder / "dials.filo", controls=controls, reads={"elbow": "swing"})
     assert done.returncode == 0, done.stdout
     info = json.loads(filoplume("info", folder / "dials.filo", "--json").stdout)

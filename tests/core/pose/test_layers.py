@@ -335,3 +335,27 @@ def test_a_falloff_of_a_control_that_rests_says_nothing():
     made = build(points, rig, [Sculpt(pose, target, falloffs)]).correctives
     again = add_sculpt(points, rig, Correctives(), pose, target, falloffs).correctives
     assert [c.layers[0].space.samples[0].falloffs for c in (made, again)] == [{"fore": (1.0,)}] * 2
+
+
+def test_sculpts_are_met_where_a_piece_of_geometry_or_a_joint_is_the_number():
+    """The number follows from the joints of a pose, whether the pose was sculpted at, moved or only looked at."""
+    rig, points = arm()
+    tip = freeze(np.flatnonzero(points[:, 0] > 0.9).astype(np.int32))
+    rig = rig.replace(controls=(
+        *rig.controls, Control(name="tip", kind="geometry", vertices=tip, travel=0.1),
+        Control(name="switch", kind="joint", joint="hand", travel=0.1)))
+    poses = [turned("bent", fore=(0, 0, 60)), turned("turned", fore=(50, 10, 0)), turned("flexed", {"flex": 1.0}),
+             turned("raised", upper=(0, 0, 40))]
+    sculpts = [Sculpt(pose, bumped(rig, points, pose, k)) for k, pose in enumerate(poses)]
+    whole = build(points, rig, sculpts).correctives
+    assert {"tip", "switch"} <= {d.control for layer in whole.layers for d in layer.space.dofs}
+    one_by_one = Correctives()
+    for sculpt in sculpts:
+        one_by_one = add_sculpt(points, rig, one_by_one, sculpt.pose, sculpt.target).correctives
+    for made in (whole, one_by_one):
+        for pose, target, _ in sculpts:
+            assert np.abs(evaluate(points, rig, made, pose) - target).max() <= 1e-6
+    moved = refresh(points, rig, moved_pose(points, rig, whole, "bent", turned("bent", fore=(0, 0, 75)))).correctives
+    assert max(e.max() for e in sculpt_errors(points, rig, moved).values()) <= 1e-6
+    with pytest.raises(Refusal, match="'bent'"):
+        refresh(points, rig, moved_pose(points, rig, whole, "bent", Pose(name="rest")))
