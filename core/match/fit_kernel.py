@@ -66,7 +66,7 @@ def _back(n, size, rhs, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _gather(shape, hold, keep, cx, cy, warp, half, xs, ys):  # type: ignore[no-untyped-def]
+def _gather(shape, hold, keep, cx, cy, mu, mv, warp, half, xs, ys):  # type: ignore[no-untyped-def]
     """The pixels under the warped pattern: count, and how many there would be without masks and borders."""
     det = warp[2] * warp[5] - warp[3] * warp[4]
     if not abs(det) > 1e-6:
@@ -78,8 +78,12 @@ def _gather(shape, hold, keep, cx, cy, warp, half, xs, ys):  # type: ignore[no-u
     stride = 1
     while 4.0 * ax * ay / (stride * stride) > MOST_PIXELS:
         stride += 1
-    x0, x1 = math.ceil(warp[0] - 1.2 * ax), math.floor(warp[0] + 1.2 * ax)
-    y0, y1 = math.ceil(warp[1] - 1.2 * ay), math.floor(warp[1] + 1.2 * ay)
+    mx = warp[0] + (warp[5] * mu - warp[3] * mv) / det
+    my = warp[1] + (warp[2] * mv - warp[4] * mu) / det
+    if not (abs(mx) < 1e6 and abs(my) < 1e6):
+        return 0, 0
+    x0, x1 = math.ceil(mx - 1.2 * ax), math.floor(mx + 1.2 * ax)
+    y0, y1 = math.ceil(my - 1.2 * ay), math.floor(my + 1.2 * ay)
     size = keep.shape[0]
     count = wanted = 0
     for y in range(y0, y1 + 1, stride):
@@ -90,7 +94,7 @@ def _gather(shape, hold, keep, cx, cy, warp, half, xs, ys):  # type: ignore[no-u
                 continue
             u = (warp[2] * dx + warp[3] * dy) / w
             v = (warp[4] * dx + warp[5] * dy) / w
-            if abs(u) > half or abs(v) > half:
+            if abs(u - mu) > half or abs(v - mv) > half:
                 continue
             wanted += 1
             if x < 0 or y < 0 or x >= shape[1] or y >= shape[0] or count >= MOST_PIXELS:
@@ -105,11 +109,11 @@ def _gather(shape, hold, keep, cx, cy, warp, half, xs, ys):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit(image, hold, coefs, keep, cx, cy, warp, light, half, size, scale, out):  # type: ignore[no-untyped-def]
+def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scale, out):  # type: ignore[no-untyped-def]
     """One pattern in one frame. warp: position, G by rows, h (8); light: gain and bias per channel (C, 2)."""
     channels, side = coefs.shape[2], coefs.shape[0]
     xs, ys = np.empty(MOST_PIXELS, np.int32), np.empty(MOST_PIXELS, np.int32)
-    count, wanted = _gather(image.shape, hold, keep, cx, cy, warp, half, xs, ys)
+    count, wanted = _gather(image.shape, hold, keep, cx, cy, mu, mv, warp, half, xs, ys)
     out[:] = 0.0
     out[6] = count
     if count < FEWEST or count < 0.4 * wanted:
@@ -276,19 +280,20 @@ def _fit(image, hold, coefs, keep, cx, cy, warp, light, half, size, scale, out):
 
 @njit(
     types.void(
-        F32_3D, BOOL_2D, F32_4D, BOOL_3D, f64[:, ::1], f64[:, ::1], f64[:, :, ::1], f64[::1], f64, I64_1D, I64_1D,
-        i64, i64,
+        F32_3D, BOOL_2D, F32_4D, BOOL_3D, f64[:, ::1], f64[:, ::1], f64[:, ::1], f64[:, :, ::1], f64[::1], f64,
+        I64_1D, I64_1D, i64, i64,
         f64[:, ::1],
     ),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
-def fit_patterns(image, hold, coefs, keep, centre, warp, light, scale, half, sizes, rows, start, stop, found):  # type: ignore[no-untyped-def]
+def fit_patterns(image, hold, coefs, keep, centre, middle, warp, light, scale, half, sizes, rows, start, stop, found):  # type: ignore[no-untyped-def]
     """Fit the patterns `rows`[start:stop] to a frame, from the warps they have.
 
     Parameters
     ----------
     image : (H, W, C) float32. hold : (H, W), True where tracks must not look, or (0, 0).
     coefs, keep, centre : templates of all patterns, see ``core.match.template.Templates``.
+    middle : (N, 2) float64, from the point to the middle of its pattern, in template pixels.
     warp : (N, 8) float64, changed: x, y of the point; G by rows; h.
     light : (N, C, 2) float64, changed: gain and bias.
     scale : (N,) variance of the noise where weights are to be robust; 0 for least squares.
@@ -305,6 +310,8 @@ def fit_patterns(image, hold, coefs, keep, centre, warp, light, scale, half, siz
             keep[n],
             centre[n, 0],
             centre[n, 1],
+            middle[n, 0],
+            middle[n, 1],
             warp[n],
             light[n],
             half,

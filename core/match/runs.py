@@ -8,7 +8,7 @@ foretold on for some frames and taken back only on a strict likeness.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import cv2
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from core.match.blur import blurred, motion_lines
 from core.match.fit_kernel import FOUND, fit_patterns
 from core.match.guide import carried_by, guide_between
+from core.match.outline import filled
 from core.match.template import Templates, cut_templates
 from core.match.track import MODELS, TrackSettings
 
@@ -26,6 +27,7 @@ Reals = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Ranges = Callable[[int, Callable[[int, int], object], int], None]
+Shape = tuple[Reals, bool] | None  # outline (P, 2) around the middle of a pattern, and whether it is a curve
 COLUMN = {name: k for k, name in enumerate(FOUND)}
 NO_HOLD = np.zeros((0, 0), np.bool_)
 ROBUST_ABOVE = 1.8  # times the variance a run is used to
@@ -63,6 +65,7 @@ class Runs:
             np.zeros((0, side, side, channels), np.float32),
             np.zeros((0, side, side), np.bool_),
             np.zeros((0, 2)),
+            np.zeros((0, 2)),
             np.zeros(0),
         )
         self.coefficients = self.templates.coefficients  # blurred like the frame at hand
@@ -87,9 +90,18 @@ class Runs:
         points: Reals,
         stop: Rows,
         hold: Mask | None = None,
+        offsets: Reals | None = None,
+        shapes: Sequence[Shape] = (),
     ) -> Rows:
-        """Begin runs at `points` (N, 2) of a frame, to be followed to the frames `stop`; returns their rows."""
-        made = cut_templates(image, points, self.settings.pattern, hold)
+        """Begin runs at `points` (N, 2) of a frame, to be followed to the frames `stop`; returns their rows.
+
+        offsets : (N, 2) to the middles of the patterns. shapes : an outline around the middle, or None, for each.
+        """
+        made = cut_templates(image, points, self.settings.pattern, hold, offsets)
+        for n, shape in enumerate(shapes):
+            if shape is not None:
+                outline, smooth = shape
+                made.keep[n] &= filled(outline + made.centre[n] + made.middle[n], smooth, *made.keep.shape[1:])
         self._hold = NO_HOLD if hold is None else np.ascontiguousarray(hold)
         first, count = len(self.alive), len(points)
         rows = np.arange(first, first + count)
@@ -176,6 +188,7 @@ class Runs:
                 self.coefficients,
                 self.templates.keep,
                 self.templates.centre,
+                self.templates.middle,
                 warp,
                 light,
                 scale,
@@ -270,12 +283,15 @@ class Runs:
         """Which rows come back: the pattern cut anew where it was found lies where it was in the frame before."""
         if self._before is None or not len(rows):
             return np.zeros(len(rows), np.bool_)
-        inside = np.clip(warp[rows, :2], 0.0, np.array(image.shape[1::-1]) - 1.0)
+        old, now = self.warp[rows], warp[rows]
+        middle = self.templates.middle[rows][:, :, None]
+        start = old[:, :2] + np.linalg.solve(old[:, 2:6].reshape(-1, 2, 2), middle)[:, :, 0]
+        inside = now[:, :2] + np.linalg.solve(now[:, 2:6].reshape(-1, 2, 2), middle)[:, :, 0]
+        inside = np.clip(inside, 0.0, np.array(image.shape[1::-1]) - 1.0)
         cut = cut_templates(image, inside, self.settings.pattern)
-        old = self.warp[rows]
         back = np.zeros((len(rows), 8))
-        back[:, :2] = old[:, :2]
-        between = np.linalg.inv(warp[rows, 2:6].reshape(-1, 2, 2)) @ old[:, 2:6].reshape(-1, 2, 2)
+        back[:, :2] = start
+        between = np.linalg.inv(now[:, 2:6].reshape(-1, 2, 2)) @ old[:, 2:6].reshape(-1, 2, 2)
         back[:, 2:6] = between.reshape(-1, 4)
         light = np.zeros((len(rows), self.channels, 2))
         light[:, :, 0] = 1.0
@@ -283,10 +299,10 @@ class Runs:
         found = np.zeros((len(rows), len(FOUND)))
         every = np.arange(len(rows))
         fit_patterns(
-            self._before, NO_HOLD, cut.coefficients, cut.keep, cut.centre, back, light, np.zeros(len(rows)), self.half,
-            sizes, every, 0, len(rows), found,
+            self._before, NO_HOLD, cut.coefficients, cut.keep, cut.centre, cut.middle, back, light, np.zeros(len(rows)),
+            self.half, sizes, every, 0, len(rows), found,
         )  # fmt: skip
-        off = np.linalg.norm(back[:, :2] - old[:, :2], axis=1)
+        off = np.linalg.norm(back[:, :2] - start, axis=1)
         return np.asarray((off < RETURN) & (found[:, COLUMN["step"]] < 0.1) & (found[:, COLUMN["iterations"]] > 0))
 
     def _places(self, image: Image, rows: Rows, sure: Rows, told: Reals, warp: Reals) -> list[Reals]:
@@ -312,20 +328,23 @@ class Runs:
         for n in rows:
             if not (np.abs(warp[n, :2]) < 1e6).all():
                 continue
-            x, y = np.floor(warp[n, :2] + 0.5).astype(int)
+            shift = np.linalg.solve(warp[n, 2:6].reshape(2, 2), self.templates.middle[n])
+            where = warp[n, :2] + shift
+            x, y = np.floor(where + 0.5).astype(int)
             x0, x1 = max(x - search - middle, 0), min(x + search + middle + 1, width)
             y0, y1 = max(y - search - middle, 0), min(y + search + middle + 1, height)
             if x1 - x0 < side or y1 - y0 < side:
                 continue
-            patch = _sample(self.coefficients[n], self.templates.centre[n], warp[n], middle)
+            inside = self.templates.centre[n] + self.templates.middle[n]
+            patch = _sample(self.coefficients[n], inside, warp[n], middle)
             likeness = cv2.matchTemplate(image[y0:y1, x0:x1], patch, cv2.TM_CCOEFF_NORMED)
             ys, xs = np.mgrid[0 : likeness.shape[0], 0 : likeness.shape[1]]
-            away = (xs + x0 + middle - warp[n, 0]) ** 2 + (ys + y0 + middle - warp[n, 1]) ** 2
+            away = (xs + x0 + middle - where[0]) ** 2 + (ys + y0 + middle - where[1]) ** 2
             likeness = np.nan_to_num(likeness, nan=-1.0) - NEARER * away.astype(np.float32) / search**2
             peaks = np.flatnonzero(likeness == cv2.dilate(likeness, np.ones((3, 3), np.uint8)))
             best = peaks[np.argsort(-likeness.ravel()[peaks])[:PEAKS]]
             py, px = divmod(int(best[min(rank, len(best) - 1)]), likeness.shape[1])
-            warp[n, :2] = px + x0 + middle, py + y0 + middle
+            warp[n, :2] = np.array([px + x0 + middle, py + y0 + middle]) - shift
 
     def _richer(
         self,

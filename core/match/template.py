@@ -23,13 +23,15 @@ class Templates(NamedTuple):
 
     coefficients : (N, S, S, C) float32, of cubic B-splines.
     keep : (N, S, S) bool, False where the frame ends or a mask holds tracks off.
-    centre : (N, 2) float64, x and y of the point inside the template.
+    centre : (N, 2) float64, x and y of the point inside (or beside) the template.
+    middle : (N, 2) float64, from the point to the middle of the pattern.
     noise : (N,) float64, variance of the noise that was taken out, per channel.
     """
 
     coefficients: NDArray[np.float32]
     keep: NDArray[np.bool_]
     centre: NDArray[np.float64]
+    middle: NDArray[np.float64]
     noise: NDArray[np.float64]
 
     def with_more(self, more: Templates) -> Templates:
@@ -38,6 +40,7 @@ class Templates(NamedTuple):
             np.concatenate((self.coefficients, more.coefficients)),
             np.concatenate((self.keep, more.keep)),
             np.concatenate((self.centre, more.centre)),
+            np.concatenate((self.middle, more.middle)),
             np.concatenate((self.noise, more.noise)),
         )
 
@@ -47,6 +50,7 @@ def cut_templates(
     points: NDArray[np.float64],
     pattern: int,
     hold: NDArray[np.bool_] | None = None,
+    offsets: NDArray[np.float64] | None = None,
 ) -> Templates:
     """Cut the pattern around every point of a frame and take its noise out.
 
@@ -56,9 +60,12 @@ def cut_templates(
     points : (N, 2) x and y in pixels, centres at whole numbers.
     pattern : side in pixels.
     hold : (H, W), True where tracks must not look.
+    offsets : (N, 2) pixels from the points to the middles of their patterns; none when left out.
     """
+    offsets = np.zeros((len(points), 2)) if offsets is None else offsets
+    middles = points + offsets
     reach = pattern // 2 + MARGIN
-    whole = np.floor(points + 0.5).astype(np.int64)
+    whole = np.floor(middles + 0.5).astype(np.int64)
     steps = np.arange(-reach, reach + 1)
     rows, columns = whole[:, 1, None] + steps, whole[:, 0, None] + steps
     height, width = image.shape[:2]
@@ -68,7 +75,7 @@ def cut_templates(
     if hold is not None:
         keep &= ~hold[rows[:, :, None], columns[:, None, :]]
     smooth, noise = denoise(pixels)
-    return Templates(spline_coefficients(smooth), keep, reach + points - whole, noise)
+    return Templates(spline_coefficients(smooth), keep, reach + points - whole, offsets, noise)
 
 
 def denoise(pixels: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

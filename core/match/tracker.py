@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from core.match.features import find_features
 from core.match.join import Piece, join_pieces
-from core.match.runs import Ranges, Runs
+from core.match.runs import Ranges, Runs, Seen, Shape
 from core.match.track import Track, TrackSettings, keyed_track
 from core.workers import serial_ranges
 
@@ -38,6 +39,8 @@ class Start(NamedTuple):
     track_id: int
     point: tuple[float, float]
     stop: int
+    offset: tuple[float, float] = (0.0, 0.0)
+    shape: Shape = None
 
 
 class Tracking:
@@ -80,39 +83,43 @@ class Tracking:
     def _sweep(self, direction: int) -> Iterator[Step]:
         starts = self._starts(direction)
         finding = self._auto if direction > 0 else 0
-        runs: Runs | None = None
-        owners: list[Piece] = []
+        groups: dict[tuple[object, ...], _Group] = {}  # tracks of the same settings
         for n, frame in enumerate(self._frames[::direction]):
-            alive = runs is not None and bool(runs.alive.any())
+            alive = any(group.runs.alive.any() for group in groups.values())
             if not (alive or frame in starts or finding):
                 if not starts:
                     return
                 continue
-            image, seen = self._read(frame), None
+            image = self._read(frame)
             if image is None:
-                if runs is not None:
-                    runs.miss()
+                for group in groups.values():
+                    group.runs.miss()
                 continue
-            runs = Runs(self.settings, image.shape[2], self._ranges) if runs is None else runs
             hold = self._hold(frame)
-            seen = runs.step(image, hold)
-            self.observations += len(seen.rows)
-            for row, *numbers in zip(*seen, strict=True):
-                owners[row].add(frame, *numbers)
-            runs.alive[runs.stop == frame] = False
+            seen = [group.step(frame, image, hold) for group in groups.values()]
+            self.observations += sum(len(one.rows) for _, one in seen)
             begin = starts.pop(frame, [])
             last = frame == self._frames[-1] and n > 0
-            if finding and not last and (n % REFILL == 0 or runs.alive.sum() < SCARCE * finding):
-                begin += self._found(image, frame, runs, hold)
-            if begin:
-                stops = np.array([start.stop for start in begin], np.int64)
-                rows = runs.begin(image, np.array([start.point for start in begin]), stops, hold)
-                for start, row in zip(begin, rows, strict=True):
-                    owners.append(Piece(start.track_id, frame, direction, runs.shared[row].copy()))
-                    self._pieces[start.track_id].append(owners[-1])
-            ids = np.array([owners[row].track_id for row in seen.rows], np.int64)
+            living = [group.runs.warp[group.runs.alive, :2] for group in groups.values()]
+            taken = np.concatenate([np.zeros((0, 2)), *living])
+            if finding and not last and (n % REFILL == 0 or len(taken) < SCARCE * finding):
+                begin += self._found(image, frame, taken, hold)
+            for settings, some in self._by_settings(begin).values():
+                key = msgspec.structs.astuple(settings)
+                if key not in groups:
+                    groups[key] = _Group(Runs(settings, image.shape[2], self._ranges), direction)
+                for piece in groups[key].begin(frame, image, some, hold):
+                    self._pieces[piece.track_id].append(piece)
             done = n + 1 + (0 if direction > 0 else len(self._frames))
-            yield Step(frame, done, 2 * len(self._frames), ids, seen.points, seen.covariance, seen.score)
+            yield _told(frame, done, 2 * len(self._frames), seen)
+
+    def _by_settings(self, starts: list[Start]) -> dict[tuple[object, ...], tuple[TrackSettings, list[Start]]]:
+        own = {track.id: track.settings or self.settings for track in self._given}
+        out: dict[tuple[object, ...], tuple[TrackSettings, list[Start]]] = {}
+        for start in starts:
+            settings = own[start.track_id]
+            out.setdefault(msgspec.structs.astuple(settings), (settings, []))[1].append(start)
+        return out
 
     def _starts(self, direction: int) -> dict[int, list[Start]]:
         """The keys to follow, by frame: to the next key of their track, or to the end of the plate."""
@@ -122,12 +129,13 @@ class Tracking:
             ends = [int(key[0]) for key in keys[1:]] + [self._frames[::direction][-1]]
             for (frame, x, y), end in zip(keys, ends, strict=True):
                 if end != int(frame):
-                    starts.setdefault(int(frame), []).append(Start(track.id, (x, y), end))
+                    shape = None if track.shape is None else (track.shape, track.shape_smooth)
+                    start = Start(track.id, (x, y), end, track.offset, shape)
+                    starts.setdefault(int(frame), []).append(start)
         return starts
 
-    def _found(self, image: Image, frame: int, runs: Runs, hold: Mask | None) -> list[Start]:
-        """New features in place of tracks that ended."""
-        taken = runs.warp[runs.alive, :2]
+    def _found(self, image: Image, frame: int, taken: NDArray[np.float64], hold: Mask | None) -> list[Start]:
+        """New features in place of tracks that ended, away from those at `taken` (N, 2)."""
         points = find_features(image, self._auto - len(taken), self.settings.pattern, taken, hold)
         starts = []
         for x, y in points:
@@ -137,6 +145,48 @@ class Tracking:
             self._pieces[track_id] = []
             starts.append(Start(track_id, (x, y), self._frames[-1]))
         return starts
+
+
+class _Group:
+    """Runs of the same settings in one sweep, and the pieces of tracks that they make."""
+
+    def __init__(self, runs: Runs, direction: int) -> None:
+        self.runs, self._direction = runs, direction
+        self._pieces: list[Piece] = []  # of every row
+
+    def step(self, frame: int, image: Image, hold: Mask | None) -> tuple[list[int], Seen]:
+        """The next frame: ids of the tracks that were seen, and what was."""
+        seen = self.runs.step(image, hold)
+        for row, *numbers in zip(*seen, strict=True):
+            self._pieces[row].add(frame, *numbers)
+        self.runs.alive[self.runs.stop == frame] = False
+        return [self._pieces[row].track_id for row in seen.rows], seen
+
+    def begin(self, frame: int, image: Image, starts: list[Start], hold: Mask | None) -> list[Piece]:
+        rows = self.runs.begin(
+            image,
+            np.array([start.point for start in starts]),
+            np.array([start.stop for start in starts], np.int64),
+            hold,
+            np.array([start.offset for start in starts]),
+            [start.shape for start in starts],
+        )
+        made = [
+            Piece(start.track_id, frame, self._direction, self.runs.shared[row].copy())
+            for start, row in zip(starts, rows, strict=True)
+        ]
+        self._pieces += made
+        return made
+
+
+def _told(frame: int, done: int, total: int, seen: list[tuple[list[int], Seen]]) -> Step:
+    ids = np.array([track_id for some, _ in seen for track_id in some], np.int64)
+    if not seen:
+        return Step(frame, done, total, ids, np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(0))
+    points, covariance, score = (
+        np.concatenate([getattr(one, name) for _, one in seen]) for name in ("points", "covariance", "score")
+    )
+    return Step(frame, done, total, ids, points, covariance, score)
 
 
 def _nothing_held(frame: int) -> Mask | None:

@@ -5,7 +5,7 @@ import pytest
 
 from core.match.track import TrackSettings, keyed_track
 from core.match.tracker import Tracking
-from tests.core.match.plates import frame, place
+from tests.core.match.plates import frame, place, texture
 
 POINTS = [np.array([x, y]) for x in (45.3, 70.0, 95.6) for y in (40.2, 62.0, 80.7)]
 
@@ -120,6 +120,52 @@ def test_a_bar_over_a_part_of_the_pattern_moves_nothing_far():
     kept = [track for track in tracks if track.frames[-1] == 19]
     assert len(kept) >= 7
     assert max(np.abs(errors(track)[track.frames > 13]).max() for track in kept) < 0.2
+
+
+def test_a_point_that_cannot_be_seen_is_carried_by_a_pattern_beside_it():
+    point, offset = POINTS[4], (18.0, -12.0)
+
+    def images(k):  # the point itself lies under a spot that stays where it is on the plate
+        image = frame(k)
+        x, y = place(point, k)
+        image[int(y) - 5 : int(y) + 6, int(x) - 5 : int(x) + 6] = 255.0 * (k % 2)
+        return image
+
+    track = keyed((point,))[0].replace(offset=offset)
+    (made,) = followed(range(16), (track,), images)
+    assert list(made.frames) == list(range(16))
+    # it turns and grows with the pattern: carried stiffly it would be 6 px off at the end
+    assert np.linalg.norm(errors(made), axis=1).max() < 0.6
+    error, c = errors(made)[1:], made.covariance[1:]
+    assert np.mean([_chi2(e, one) for e, one in zip(error, c, strict=True)]) < 3.0
+    (plain,) = followed(range(16), keyed((point + offset,)), images)
+    assert c[-1, 0] > 2.0 * plain.covariance[-1, 0]  # and it is less sure than its pattern
+
+
+def test_a_shape_keeps_the_pattern_on_what_moves_together():
+    """A bar lies still beside the point: a square pattern takes it in, a shape leaves it out."""
+
+    def images(k):
+        image = frame(k)
+        image[:, 74:] = texture(np.arange(74.0, 160.0), np.arange(120.0)[:, None])
+        return image
+
+    shape = np.array([[-10.0, -10.0], [-1.0, -10.0], [-1.0, 10.0], [-10.0, 10.0]])
+    tracks = keyed([POINTS[4] + [2.0, 0.0]])
+    (made,) = followed(range(3), (tracks[0].replace(shape=shape),), images)
+    (square,) = followed(range(3), tracks, images)
+    assert np.linalg.norm(errors(made), axis=1).max() < 0.2
+    assert len(square.frames) < 3 or np.linalg.norm(errors(square), axis=1).max() > 0.5
+
+
+def test_every_track_has_its_own_settings():
+    tracks = keyed(POINTS[:2])
+    tracks = (tracks[0], tracks[1].replace(settings=TrackSettings(pattern=31, model="translation")))
+    made = followed(range(5), tracks, frame)
+    plain = followed(range(5), tracks[:1], frame)
+    other = followed(range(5), tracks[1:], frame, pattern=31, model="translation")
+    for one, expected in zip(made, plain + other, strict=True):
+        np.testing.assert_array_equal(one.points, expected.points)
 
 
 def test_what_a_mask_holds_off_is_not_found():
