@@ -173,7 +173,8 @@ def move_pose(document: Document, mesh_id: int, name: str, pose: Pose) -> Docume
     """The document with a sculpt at another pose of the same controls; its corrections stay what they are."""
     item, rig = rigged(document, mesh_id)
     at, _ = _place(document, mesh_id, name)
-    moved = edit_layers.moved_pose(item.mesh.points, rig, _correctives(document, mesh_id), name, pose)
+    there = without_noise(rig, pose).replace(name=name)
+    moved = edit_layers.moved_pose(item.mesh.points, rig, _correctives(document, mesh_id), name, there)
     return _changed(document, mesh_id, moved, at)
 
 
@@ -260,9 +261,7 @@ def hold_pose(document: Document, mesh_id: int, pose: Pose | None) -> Document:
 def select_joints(document: Document, mesh_id: int, names: Sequence[str]) -> Document:
     """The document with joints of a mesh selected, the active one last; UserError when there is no such joint."""
     item, rig = rigged(document, mesh_id)
-    for name in names:
-        if name not in rig.skeleton.names:
-            raise UserError(f"There is no joint {name!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")
+    check_joints(rig, names)
     wanted = tuple(dict.fromkeys(names))
     return document if wanted == item.joint_selection else with_mesh(document, item.replace(joint_selection=wanted))
 
@@ -328,6 +327,13 @@ def rigged(document: Document, mesh_id: int) -> tuple[MeshObject, Rig]:
     if item.rig is None:
         raise UserError(f"{item.name} has no rig; import one with a skeleton or blend shapes.")
     return item, item.rig
+
+
+def check_joints(rig: Rig, names: Sequence[str]) -> None:
+    """UserError when one of them is no joint of the rig."""
+    for name in names:
+        if name not in rig.skeleton.names:
+            raise UserError(f"There is no joint {name!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")
 
 
 def _correctives(document: Document, mesh_id: int) -> Correctives:

@@ -15,9 +15,9 @@ from core.pose.keying import keyed, still_clip
 from core.pose.mirror_pose import mirror_of_rig, mirrored_pose, with_other_side
 from core.pose.pose import REST, Pose
 from core.pose.pose_map import mixed_pose
-from core.pose.rig import Rig, all_clips
+from core.pose.rig import all_clips
 from core.pose.synthesis import pose_at
-from tools.pose_edits import hold_pose, pose_named, rigged, same_pose
+from tools.pose_edits import check_joints, hold_pose, pose_named, rigged, same_pose
 
 
 def shown_pose(document: Document, mesh_id: int, frame: float) -> Pose:
@@ -44,7 +44,9 @@ def reset_pose(document: Document, mesh_id: int, pose: Pose, joints: Sequence[st
     _, rig = rigged(document, mesh_id)
     if joints is None:
         return hold_pose(document, mesh_id, REST)
-    _check_joints(rig, joints)
+    if not joints:
+        raise UserError("No joint is selected; click a joint, or the skin it moves.")
+    check_joints(rig, joints)
     kept: dict[str, Any] = {field: {name: value for name, value in getattr(pose, field).items() if name not in joints}
                             for field in ("rotations", "translations")}
     return hold_pose(document, mesh_id, pose.replace(**kept))
@@ -83,11 +85,3 @@ def held_in_library(document: Document, mesh_id: int, pose: Pose) -> str | None:
     """The name under which the library has a pose, None when it has not."""
     item, _ = rigged(document, mesh_id)
     return next((known.name for known in item.library if same_pose(known, pose)), None)
-
-
-def _check_joints(rig: Rig, names: Sequence[str]) -> None:
-    if not names:
-        raise UserError("No joint is selected; click a joint, or the skin it moves.")
-    for name in names:
-        if name not in rig.skeleton.names:
-            raise UserError(f"There is no joint {name!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")

@@ -22,7 +22,7 @@ from core.pose.sculpt.ring import whole_surface
 from core.pose.sculpt.surface import sculpt_surface
 from core.pose.skeleton import SkinWeights
 from core.record import freeze
-from tools.pose_edits import rigged
+from tools.pose_edits import check_joints, rigged
 
 MaskEdit = Literal["clear", "invert", "grow", "shrink", "blur"]
 
@@ -61,8 +61,7 @@ def smooth_weights(document: Document, mesh_id: int, amount: float = 0.5, passes
                    joint: str | None = None) -> Document:
     """The document with weights evened out between neighbours; of one joint, or of all when None."""
     item, rig = _skinned(document, mesh_id)
-    if joint is not None and joint not in rig.skeleton.names:
-        raise UserError(f"There is no joint {joint!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")
+    check_joints(rig, () if joint is None else (joint,))
     edges, skin = edge_vertices(item.mesh), rig.skin
     amounts = np.full(len(skin.joints), amount)
     active = None if joint is None else rig.skeleton.names.index(joint)
@@ -93,9 +92,7 @@ def prune_weights(document: Document, mesh_id: int, least: float = 0.01) -> Docu
 def lock_joints(document: Document, mesh_id: int, names: Sequence[str], locked: bool = True) -> Document:
     """The document with the weights of joints locked, or free again."""
     item, rig = rigged(document, mesh_id)
-    for name in names:
-        if name not in rig.skeleton.names:
-            raise UserError(f"There is no joint {name!r}; choose one of {', '.join(rig.skeleton.names[:20])}.")
+    check_joints(rig, names)
     now = set(item.locked_joints) | set(names) if locked else set(item.locked_joints) - set(names)
     wanted = tuple(name for name in rig.skeleton.names if name in now)
     return document if wanted == item.locked_joints else with_mesh(document, item.replace(locked_joints=wanted))

@@ -29,7 +29,7 @@ from tools.tool import Sight
 ANIMATION = Path(os.environ.get("FILOPLUME_DATA", "../shared/data")) / "animation"
 SCULPTS = [kind.name for kind in Registry(()).of("pose") if kind.edits == "surface"]
 RIGS = (
-    "fox_gltf/animated/Fox.glb", "bird_morph_parrot/Parrot.glb", "libigl_skin_A/arm.tgf",
+    "fox_gltf/animated/Fox.glb", "bird_morph_parrot/Parrot.glb",
     "usdskel_bake/usdSkel/testenv/testUsdSkelBakeSkinning/lbs.usda",
 )  # fmt: skip
 EVALUATOR = Evaluator()

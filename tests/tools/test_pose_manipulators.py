@@ -7,14 +7,17 @@ import pytest
 
 from core.camera import clip_from_world
 from core.document import Document, MeshObject
+from core.errors import UserError
 from core.groom.region import View
 from core.leaves import same_bits
 from core.mesh.mesh import Mesh
 from core.overlay import Label, Polyline
+from core.pose.keying import still_clip
 from core.pose.pose import REST, local_of_pose
 from core.pose.rig import Constraint
 from core.pose.rotation import polar_rotation
 from core.pose.skinning import object_matrices
+from core.pose.synthesis import pose_at
 from core.record import freeze
 from core.workspace import Respect, Workspace
 from tests.core.pose.arms import arm, turned
@@ -197,6 +200,16 @@ def test_the_elbow_turns_and_the_hand_stays():
     after = world(s)
     assert np.allclose(after["hand"][:3, 3], before["hand"][:3, 3], atol=1e-6)
     assert np.linalg.norm(after["fore"][:3, 3] - before["fore"][:3, 3]) > 0.01
+
+
+def test_a_clip_that_rests_but_for_its_rounding_is_at_rest():
+    s = posing("draw")
+    item = s.document.meshes[0]
+    playing = item.rig.replace(clip=still_clip(item.rig.skeleton, 1001.0, 3, 24.0))
+    assert pose_at(playing, 1002.0).rotations, "there is rounding, otherwise this shows nothing"
+    s.edit("Clip", lambda d: d.replace(meshes=(item.replace(rig=playing),)))
+    with pytest.raises(UserError, match="away from rest"):
+        s.hand.press(SIGHT, Pointer(200.0, 200.0))
 
 
 def test_limits_hold_while_a_ring_is_dragged():
