@@ -67,12 +67,15 @@ def scales(
 
     Parameters
     ----------
-    own : falloffs by control, in place of those of the dofs.
+    own : falloffs by control, in place of those of the dofs; of a joint that turns and moves, of how it turns.
     weights : (len(dofs),) by which squared distances are multiplied (weighted pose space deformation).
     """
     out: list[float] = []
+    turning = {dof.control for dof in dofs if dof.kind not in ("translation", "number")}
     for i, dof in enumerate(dofs):
         falloff = (own or {}).get(dof.control, dof.falloff)
+        if dof.kind == "translation" and dof.control in turning:
+            falloff = dof.falloff
         share = 1.0 if weights is None else math.sqrt(float(weights[i]))
         if dof.kind in ("translation", "number"):
             count = WIDTHS[dof.kind]

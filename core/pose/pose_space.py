@@ -65,7 +65,10 @@ def check_falloff(falloff: Falloff, kind: str, label: str) -> None:
 
 
 class PoseSample(Record):
-    """A pose somebody sculpted at. `falloffs` are its own, by control, in place of those of the space."""
+    """A pose somebody sculpted at.
+
+    `falloffs` are its own, by control, in place of those of the space; of a joint that turns and moves, how it turns.
+    """
 
     pose: Pose
     falloffs: dict[str, Falloff] = msgspec.field(default_factory=dict)

@@ -138,3 +138,10 @@ def test_a_falloff_away_the_distance_is_one():
         assert np.isclose(np.linalg.norm(places[1] - places[0]), 1.0)
     assert chord(np.pi) == 2.0
     assert chord(4.0) > chord(3.5) > 2.0
+
+
+def test_the_falloff_of_a_joint_that_turns_and_moves_is_of_its_turn():
+    turn, move = Dof(control="j"), Dof(control="j", kind="translation", falloff=(0.1,))
+    own = {"j": (0.5,)}
+    assert np.array_equal(scales([turn, move], own), [*scales([turn], own), 10.0, 10.0, 10.0])
+    assert np.array_equal(scales([move], own), [2.0, 2.0, 2.0])
