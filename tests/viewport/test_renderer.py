@@ -125,13 +125,13 @@ def resident_megabytes() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def test_fifty_renderers_leave_nothing_behind(ctx):
+def test_twenty_renderers_leave_nothing_behind(ctx):
     skin, coat = ball(count=300)
     guides = GuideLines(coat.points[:20], np.zeros(20, np.uint8))
     color = ctx.renderbuffer((W, H), 3)
     target = ctx.framebuffer([color])
     memory = 0.0
-    for turn in range(50):
+    for turn in range(20):
         renderer = Renderer(ctx, shadow_side=512)
         renderer.draw(Scene((skin,), (coat,), (guides,)), camera(), target, (W, H))
         other = coat._replace(points=coat.points[:100], ids=coat.ids[:100], normals=coat.normals[:100])
@@ -140,8 +140,8 @@ def test_fifty_renderers_leave_nothing_behind(ctx):
         del renderer
         gc.collect()
         assert collect(ctx) == 0, "something was dropped without being released"
-        if turn == 9:
+        if turn == 4:
             memory = resident_megabytes()
-    assert resident_megabytes() - memory < 60.0  # leaking the maps of the light alone would be 160
+    assert resident_megabytes() - memory < 25.0  # leaking the maps of the light alone would be 60
     target.release()
     color.release()

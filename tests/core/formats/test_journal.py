@@ -115,6 +115,8 @@ def test_a_torn_end_costs_the_newest_state_and_nothing_else(journal):
     torn = journal.folder / "torn"
     torn.write_bytes(data)
     for length in range(len(data) - 1, -1, -1):
+        if length % 7 and min(abs(length - end) for end in [0, *ends]) > 40:
+            continue  # between the ends of states every seventh
         os.truncate(torn, length)
         state = recover_files([torn])
         whole = sum(end <= length for end in ends)
