@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from core.errors import UserError
-from core.match.track import HAND, Track
+from core.match.track import HAND, PlaneTrack, Track
 from core.record import freeze
 
 COLUMNS = ("frames", "points", "covariance", "own", "score")
@@ -90,6 +90,53 @@ def offset_track(track: Track, frame: int, point: tuple[float, float], new_id: i
     by = np.asarray(point) - track.points[at[0]]
     keys = track.keys + np.array([0.0, *by])
     return track.replace(id=new_id, name=new_name, points=freeze(track.points + by), keys=freeze(keys))
+
+
+def merge_tracked(before: Track, made: Track, frames: range) -> Track:
+    """What was tracked anew on `frames`, and beside them what the track held before."""
+    rest = ~np.isin(before.frames, np.arange(frames[0], frames[-1] + 1)) if len(frames) else before.frames >= 0
+    inside = np.isin(made.frames, np.arange(frames[0], frames[-1] + 1)) if len(frames) else made.frames < 0
+    order = np.argsort(np.concatenate((before.frames[rest], made.frames[inside])), kind="stable")
+    changed = {
+        name: freeze(np.concatenate((getattr(before, name)[rest], getattr(made, name)[inside]))[order])
+        for name in COLUMNS
+    }
+    return made.replace(**changed)
+
+
+def rekey_track(track: Track, frame: int) -> Track:
+    """The point where it was seen on that frame becomes a key: a new template is cut there when it is tracked anew."""
+    at = np.flatnonzero(track.frames == frame)
+    if not len(at):
+        raise UserError(f"Track {track.name} is not seen on frame {frame}; choose a frame where it is.")
+    x, y = track.points[at[0]]
+    return key_track(track, frame, (float(x), float(y)))
+
+
+def reproject_track(track: Track, plane: PlaneTrack) -> Track:
+    """The track filled where it was not seen and its plane was: carried by the plane from the nearest frame of both.
+
+    What is carried is as unsure as where it starts and, twice, as the plane; its score is that of the plane.
+    """
+    rows = np.flatnonzero(np.isin(track.frames, plane.frames))
+    if track.plate_id != plane.plate_id or not len(rows):
+        raise UserError(f"Track {track.name} and plane {plane.name} share no frame; choose two that are seen together.")
+    missing = plane.frames[~np.isin(plane.frames, track.frames)]
+    if not len(missing):
+        return track
+    shared = track.frames[rows]
+    start = rows[np.abs(shared[None] - missing[:, None]).argmin(axis=1)]
+    to, off = np.searchsorted(plane.frames, missing), np.searchsorted(plane.frames, track.frames[start])
+    matrix = plane.homographies[to] @ np.linalg.inv(plane.homographies[off])
+    there = np.einsum("nij,nj->ni", matrix, np.column_stack((track.points[start], np.ones(len(start)))))
+    variance = np.stack((plane.error[to] ** 2 + plane.error[off] ** 2,) * 3, axis=1) * [1.0, 0.0, 1.0]
+    added = {
+        "frames": missing, "points": there[:, :2] / there[:, 2:], "covariance": track.covariance[start] + variance,
+        "own": variance + HAND * np.array([1.0, 0.0, 1.0]), "score": plane.score[to],
+    }  # fmt: skip
+    order = np.argsort(np.concatenate((track.frames, missing)), kind="stable")
+    changed = {name: freeze(np.concatenate((getattr(track, name), value))[order]) for name, value in added.items()}
+    return track.replace(**changed)
 
 
 def _part(track: Track, rows: NDArray[np.bool_]) -> Track:

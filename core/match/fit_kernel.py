@@ -67,7 +67,7 @@ def _back(n, size, rhs, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _gather(shape, hold, keep, cx, cy, mu, mv, warp, half, xs, ys):  # type: ignore[no-untyped-def]
-    """The pixels under the warped pattern: count, and how many there would be without masks and borders."""
+    """The pixels under the warped pattern: count, and how many there would be without masks and borders there."""
     det = warp[2] * warp[5] - warp[3] * warp[4]
     if not abs(det) > 1e-6:
         return 0, 0
@@ -96,15 +96,16 @@ def _gather(shape, hold, keep, cx, cy, mu, mv, warp, half, xs, ys):  # type: ign
             v = (warp[4] * dx + warp[5] * dy) / w
             if abs(u - mu) > half or abs(v - mv) > half:
                 continue
+            i, j = int(cx + u + 0.5), int(cy + v + 0.5)
+            if not (0 <= i < size and 0 <= j < size and keep[j, i]):
+                continue
             wanted += 1
             if x < 0 or y < 0 or x >= shape[1] or y >= shape[0] or count >= MOST_PIXELS:
                 continue
             if hold.shape[0] and hold[y, x]:
                 continue
-            i, j = int(cx + u + 0.5), int(cy + v + 0.5)
-            if 0 <= i < size and 0 <= j < size and keep[j, i]:
-                xs[count], ys[count] = x, y
-                count += 1
+            xs[count], ys[count] = x, y
+            count += 1
     return count, wanted
 
 
