@@ -7,8 +7,19 @@ from core.document import Document
 from core.errors import UserError
 from core.formats.project import read_project, write_project
 from core.image.plate import FilmBack, Plate
-from core.match.edits import average_tracks, join_tracks, key_track, offset_track, smooth_track, split_track
+from core.match.edits import (
+    average_tracks,
+    join_tracks,
+    key_track,
+    merge_tracked,
+    offset_track,
+    rekey_track,
+    smooth_track,
+    split_track,
+)  # fmt: skip
+from core.match.reacquire import find_again
 from core.match.track import Track, keyed_track
+from tests.core.match.plates import frame, place
 
 FRAMES = np.arange(1001, 1021, dtype=np.int32)
 
@@ -58,6 +69,35 @@ def test_a_key_is_where_it_was_put_and_an_offset_keeps_its_distance():
     assert len(keyed.frames) == 20
     moved = offset_track(track_of(PATH), 1003, (100.0, 100.0), 5, "beside")
     np.testing.assert_allclose(moved.points - PATH, np.tile([100.0, 100.0] - PATH[2], (20, 1)))
+
+
+def test_where_a_point_was_seen_it_can_become_a_key():
+    keyed = rekey_track(track_of(PATH), 1009)
+    assert keyed.keys[:, 0].tolist() == [1001.0, 1009.0]
+    np.testing.assert_array_equal(keyed.points, PATH)
+    with pytest.raises(UserError, match="not seen"):
+        rekey_track(track_of(PATH), 2000)
+
+
+def test_tracking_some_frames_anew_leaves_the_others():
+    anew = track_of(PATH[4:9] + 1.0, frames=FRAMES[4:9])
+    merged = merge_tracked(track_of(PATH), anew, range(1004, 1012))
+    # 1004 and 1010, 1011 were looked at and not seen any more
+    assert [k for k in FRAMES if k not in merged.frames] == [1004, 1010, 1011]
+    np.testing.assert_array_equal(merged.points[:3], PATH[:3])
+    np.testing.assert_array_equal(merged.points[3:8], PATH[4:9] + 1.0)
+    np.testing.assert_array_equal(merged.points[8:], PATH[11:])
+
+
+def test_a_lost_pattern_is_found_again_near_a_click_and_nowhere_else():
+    point = np.array([70.0, 62.0])
+    track = keyed_track(1, "a", np.array([[0.0, *point]]))
+    there = place(point, 18)
+    found, score = find_again(track, frame(0), 0, frame(18), (there[0] + 9.0, there[1] - 7.0))
+    assert np.linalg.norm(found - there) < 0.2
+    assert score > 0.9
+    noise = np.random.default_rng(0).uniform(0, 255, (120, 160, 3)).astype(np.float32)
+    assert find_again(track, frame(0), 0, noise, tuple(there)) is None
 
 
 def test_plates_and_tracks_are_part_of_the_document_and_its_file(tmp_path):
