@@ -110,7 +110,7 @@ class KeysAtHand(QObject):
         self._read()
 
     def insert(self) -> None:
-        """A key on the frame of the timeline, in every curve that is shown; the curves stay as they are."""
+        """A key on the frame of the timeline, in every curve that is shown, with the value the curve has there."""
         frame = self._desk.workspace.frame
         made = {keyed.address: with_key(keyed.curve, frame) for keyed in self.curves}
         self.commit("Insert keys", made, {address: _on(curve, frame) for address, curve in made.items()})

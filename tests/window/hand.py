@@ -73,7 +73,7 @@ class Hand:
 
     def rest(self) -> None:
         """Wait until everything is finished."""
-        self.until(lambda: self.window.settled, 60_000)
+        self.until(lambda: self.window.settled, 240_000)
 
     def until(self, true: Callable[[], bool], milliseconds: int = 15_000) -> None:
         self._bot.waitUntil(true, timeout=milliseconds)
