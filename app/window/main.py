@@ -34,6 +34,7 @@ from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
+from app.window.match_list import TrackList
 from app.window.match_view import PlateView
 from app.window.memory import give_back_freed_memory
 from app.window.opening import Opening
@@ -57,7 +58,7 @@ from app.window.timeline import Timeline
 from app.window.top_bar import TopBar
 from app.window.view_host import ViewHost
 from app.window.viewport_widget import Viewport
-from app.window.window_commands import PANEL_CRAFTS, PANELS, shown_panels, written_panels
+from app.window.window_commands import LEFT_OUT, PANEL_CRAFTS, PANELS, shown_panels, written_panels
 from core.camera import Camera
 from core.document import Document
 from core.errors import UserError
@@ -141,6 +142,7 @@ class MainWindow(QMainWindow):
             ("poses", Section(PANELS["poses"][0], PoseList(self.desk), memory, "poses")),
             ("library", Section(PANELS["library"][0], PoseLibrary(self.desk), memory, "library")),
             ("respect", RespectPanel(self.desk, memory)),
+            ("tracks", Section(PANELS["tracks"][0], TrackList(self.desk), memory, "tracks")),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),
             ("history", Section(PANELS["history"][0], HistoryPanel(self.desk), memory, "history")),
@@ -419,7 +421,8 @@ class MainWindow(QMainWindow):
     def _show_panels(self) -> None:
         visible = shown_panels(self.desk.workspace.panels)
         craft = self.desk.session.tool.craft
-        shown = {name for name in visible if PANEL_CRAFTS.get(name, craft) == craft}
+        shown = {
+            name for name in visible if PANEL_CRAFTS.get(name, craft) == craft and name not in LEFT_OUT.get(craft, ())}
         for name, panel in self.panels.items():
             panel.setVisible(name in shown)
         self.column.setVisible(any(name in shown for name in self.panels if name not in AROUND))
@@ -448,7 +451,9 @@ class MainWindow(QMainWindow):
                 panel.set_unit(self._settings.unit)
 
     def _show_cached(self) -> None:
-        if self.viewport.picture is not None:
+        if self.match.shown:
+            self.timeline.set_cached(self.match.screen.held())
+        elif self.viewport.picture is not None:
             self.timeline.set_cached(self.viewport.picture.live.cached_frames(self.desk.document))
 
     def _take_session(self) -> None:

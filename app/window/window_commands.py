@@ -21,6 +21,7 @@ PANELS = {
     "poses": ("Poses", "Shows or hides sculpted poses, their layers and how far each of them reaches."),
     "library": ("Pose library", "Shows or hides the poses that are kept by name for later."),
     "pose_map": ("Pose map", "Shows or hides the map of pose space beside the model."),
+    "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
     "history": ("History", "Shows or hides the list of steps that undo goes through."),
@@ -30,7 +31,9 @@ PANELS = {
 # panels that belong to one craft; the others are those of all
 PANEL_CRAFTS = {
     "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "pose_map": "pose",
+    "tracks": "match",
 }
+LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
 AT_FIRST_HIDDEN = ("curves",)
 PUT_AWAY = "-"  # before the name of a panel in Workspace.panels that was hidden by hand
 TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels

@@ -38,7 +38,8 @@ def stretch_of(track: Track, frame: int, way: Way, there: range) -> Stretch:
     UserError
         There is no key to begin at, or no frame to go to.
     """
-    keys = track.keys[:, 0].astype(np.int64)
+    given = track.keys[(track.keys[:, 0] >= there[0]) & (track.keys[:, 0] <= there[-1])]
+    keys = given[:, 0].astype(np.int64)
     before, after = keys[keys <= frame], keys[keys >= frame]
     last, first = there[-1], there[0]
     if way == "both":
@@ -64,7 +65,7 @@ def stretch_of(track: Track, frame: int, way: Way, there: range) -> Stretch:
             raise UserError(f"Track {track.name} has no two keys about frame {frame}; set its place on another frame.")
         frames = range(int(behind[-1]), int(beyond[0]) + 1)
         made = frames
-    inside = track.keys[(keys >= frames[0]) & (keys <= frames[-1])]
+    inside = given[(keys >= frames[0]) & (keys <= frames[-1])]
     if not len(inside):
         raise UserError(f"Track {track.name} has no key on the frames of the plate; set its place here first.")
     return Stretch(frames, made, track.replace(keys=freeze(inside.copy())))
