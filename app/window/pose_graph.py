@@ -67,7 +67,7 @@ class Graph(QWidget):
     def area(self) -> QRectF:
         """Where the lines are."""
         small = look_of().small
-        return QRectF(self.rect()).adjusted(3 * small, small + 6, -6, -(small + 8))
+        return QRectF(self.rect()).adjusted(4 * small + 4, small + 6, -6, -(small + 8))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self._point(event)
@@ -98,10 +98,10 @@ class Graph(QWidget):
             painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
             painter.setPen(theme.colour("dim"))
             painter.drawText(QRectF(0, y - 8, area.left() - 4, 16),
-                             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, f"{value:.3g}")
+                             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, f"{value:.2g}")
         below = QRectF(area.left(), area.bottom() + 2, area.width(), look.small + 5)
-        painter.drawText(below, Qt.AlignmentFlag.AlignLeft, f"{low_x:.4g}")
-        painter.drawText(below, Qt.AlignmentFlag.AlignRight, f"{high_x:.4g}")
+        painter.drawText(below, Qt.AlignmentFlag.AlignLeft, f"{round(low_x, 1):g}")
+        painter.drawText(below, Qt.AlignmentFlag.AlignRight, f"{round(high_x, 1):g}")
         painter.drawText(below, Qt.AlignmentFlag.AlignHCenter, f"{self.up} / {self.across}")
         left = area.left()
         for k, line in enumerate(self.lines):

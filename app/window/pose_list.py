@@ -31,6 +31,7 @@ from core.field import Field, fields_of
 from core.pose.compare import LABELS, METHODS, Method
 from core.pose.pose import REST, Pose
 from core.pose.pose_space import Dof, PoseLayer, PoseSample, PoseSpace
+from core.pose.refusal import Refusal
 from core.pose.synthesis import pose_at
 from core.workspace import Workspace
 from tools import pose_edits
@@ -274,9 +275,25 @@ class PoseList(QWidget):
     def _edit(self, step: str, function: Callable[..., Document], *args: object, **parameters: object) -> None:
         item = self.desk.posed
         if item is not None:
-            self.desk.edit(step, function, item.id, *args, **parameters)
+            try:
+                self.desk.session.edit(step, function, item.id, *args, **parameters)
+            except UserError as error:
+                self.desk.error(error)
+                refused = error.poses if isinstance(error, Refusal) else ()
+            else:
+                refused = ()
             self._seen = None  # what was refused goes back to what it was
             self.refresh()
+            if refused:
+                self._offer(refused)
+
+    def _offer(self, names: tuple[str, ...]) -> None:
+        """Choose the poses that a refusal names, so that they can be merged, deleted or moved at once."""
+        self.list.clearSelection()
+        for row in range(self.list.topLevelItemCount()):
+            top = self.list.topLevelItem(row)
+            for entry in (top.child(k) for k in range(top.childCount())):
+                entry.setSelected(entry.data(0, _ROLE) in names)
 
     # -- what changes ------------------------------------------------------------------------------------
 

@@ -120,7 +120,7 @@ class PoseViews(QObject):
         if widest is not None:
             legend = Legend(widest.title, widest.ticks, widest.signed)
         elif self.heat == "weight" and _joint(item) is None:
-            legend = Legend("Click a joint to see its weights", ("0", "0.5", "1"))
+            legend = Legend("Pick a joint with Rotate first", ("0", "0.5", "1"))
         if heat is not None and widest is not None and len(heat.values) == len(surface.points):
             values = self.desk.session.evaluator.get(_shares, heat.values, low=widest.low, high=widest.high)
             surface = surface._replace(values=values, ramp="signed" if widest.signed else "heat")

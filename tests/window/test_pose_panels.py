@@ -157,6 +157,19 @@ def test_a_sculpt_at_a_taken_pose_is_refused_in_words(posing: Hand) -> None:
     QTest.mouseClick(poses.buttons["add"], LEFT)
     assert said
     assert "rest" in said[0]
+    bent = desk.posed.correctives.layers[0].space.samples[0].pose
+    half = {"elbow": tuple(map(float, quaternion_from_euler((0.0, 0.0, 40.0))))}
+    desk.edit("Pose", hold_pose, 1, bent.replace(name="half", rotations=half))
+    QTest.mouseClick(poses.buttons["add"], LEFT)
+    name = desk.posed.correctives.layers[0].space.samples[1].name
+    desk.edit("Pose", hold_pose, 1, bent.replace(name="again"))
+    poses.list.clearSelection()
+    poses.list.topLevelItem(0).child(1).setSelected(True)
+    assert poses.chosen == [name]
+    QTest.mouseClick(poses.buttons["move"], LEFT)
+    assert bent.name in said[1]
+    assert set(poses.chosen) == {bent.name, name}, "those that the refusal names, to be merged or deleted"
+    assert poses.buttons["merge"].isEnabled()
 
 
 def test_poses_are_kept_in_the_library_and_held_again(posing: Hand) -> None:
