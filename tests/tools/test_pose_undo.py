@@ -221,4 +221,4 @@ class PoseEdits(UndoMachine):
 
 TestPoseEdits = PoseEdits.TestCase
 TestPoseEdits.settings = settings(
-    max_examples=20, stateful_step_count=20, deadline=None, suppress_health_check=list(HealthCheck))
+    max_examples=15, stateful_step_count=20, deadline=None, suppress_health_check=list(HealthCheck))
