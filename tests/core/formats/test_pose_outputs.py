@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from core.formats.project import read_project, write_project
 from core.formats.rig_file import document_of, read_rig
 from core.leaves import same_bits
 from core.pose.corrective import as_kind
+from core.pose.kernels import VERSION
 from core.pose.pose import Pose, local_of_pose
 from core.pose.rig import Constraint, Control
 from core.pose.rotation import euler_from_quaternion
@@ -110,6 +112,8 @@ def test_a_rig_goes_out_and_comes_back_with_its_poses_and_layers(suffix, tmp_pat
         theirs = evaluate_at(found.mesh.points, found.rig, again, frame)
         assert np.abs(theirs - ours).max() <= 1e-6 * size(made)
     assert document_of(found).meshes[0].correctives is found.correctives
+    kernels = [(layer.space.kernel, layer.space.kernel_version) for layer in found.correctives.layers]
+    assert kernels == [("gaussian", VERSION)] * len(found.correctives.layers)
 
 
 def test_corrections_of_a_mesh_that_was_edited_elsewhere_are_shapes(item, tmp_path):
@@ -147,6 +151,22 @@ def test_usd_bakes_the_same_points_itself(item, tmp_path):
         frame = item.rig.clip.start + sample
         theirs = np.array(mesh.GetPointsAttr().Get(frame))
         assert np.abs(theirs - evaluate_at(item.mesh.points, item.rig, ready, frame)).max() <= 1e-5 * size(item)
+
+
+def test_every_file_says_which_version_of_the_kernels_it_was_made_with(item, tmp_path):
+    """So that a release with other formulas can go on using these."""
+    from pxr import Usd
+
+    write(tmp_path / "arm.usdc", item, 24.0)
+    write(tmp_path / "arm.json", item, 24.0)
+    write_project(tmp_path / "arm.filo", Document(meshes=(item,)))
+    stage = Usd.Stage.Open(str(tmp_path / "arm.usdc"))
+    drivers = json.loads(stage.GetDefaultPrim().GetCustomDataByKey("filoplume:drivers"))
+    assert {layer["space"]["kernel_version"] for layer in drivers["layers"]} == {VERSION}
+    assert {layer["kernel_version"] for layer in json.loads((tmp_path / "arm.json").read_text())["layers"]} == {VERSION}
+    with zipfile.ZipFile(tmp_path / "arm.filo") as archive:
+        trees = [archive.read(name).decode() for name in archive.namelist() if name.endswith(".json")]
+    assert sum(tree.count(f'"kernel_version":{VERSION}') for tree in trees) == len(item.correctives.layers)
 
 
 def test_usd_says_what_drives_the_shapes(item, tmp_path):
