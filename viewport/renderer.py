@@ -23,7 +23,8 @@ from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids
 
 LARGEST_TILE = 4096  # samples on a side
-TILES_KEPT = 2  # a window paints with one sample and with four in turns, and fresh memory of that size takes 50 ms
+TILE_STEP = 256  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
+MUCH_TOO_LARGE = 5.0  # times; a window paints with one sample and with four in turns
 SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps
 
 Progress = Callable[[float], object]
@@ -40,7 +41,7 @@ class Prepared(NamedTuple):
 
 
 class _Tile(NamedTuple):
-    """What samples of a tile are painted into."""
+    """What samples of a tile are painted into, from the lower left corner."""
 
     light: moderngl.Texture
     depth: moderngl.Renderbuffer
@@ -73,7 +74,7 @@ class Renderer:
         self.outline = Outline()
         self.coats: list[CoatDrawable] = []
         self.guides: list[GuideDrawable] = []
-        self.tiles: list[_Tile] = []  # the last used first
+        self.tile: _Tile | None = None  # kept, for fresh memory of that size takes 50 ms
 
     def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
         """Upload again, before the next picture, these rows of an array of hairs or guides written to in place."""
@@ -152,7 +153,8 @@ class Renderer:
         for number, tile in enumerate(tiles):
             painted = self._paint_tile(prepared, samples, tile, orders, pieces)
             yield from _scaled(painted, 0.1 + 0.9 * number / len(tiles), 0.1 + 0.9 * (number + 1) / len(tiles))
-            light = self.tiles[0].light
+            assert self.tile is not None
+            light = self.tile.light
             band = max(1, 2 * SAMPLES_AT_ONCE // (tile[2] * samples**2))
             for bottom in range(0, tile[3], band):
                 framebuffer.scissor = (tile[0], tile[1] + bottom, tile[2], min(band, tile[3] - bottom))
@@ -178,17 +180,21 @@ class Renderer:
     ) -> Iterator[float]:
         scene, camera, size = prepared.scene, prepared.camera, prepared.size
         matrix = _tile_from_picture(size, tile) @ clip_from_world(camera, *size)
-        target = self._tile_target(tile[2] * samples, tile[3] * samples)
+        width, height = tile[2] * samples, tile[3] * samples
+        yield from self._make_room(width, height)
+        assert self.tile is not None
+        target = self.tile.target
+        target.viewport = (0, 0, width, height)
         target.use()
-        target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0, viewport=target.viewport)
         uniforms = {**prepared.uniforms, "clip_from_world": matrix}
-        rows = max(1, SAMPLES_AT_ONCE // target.width)
-        for bottom in range(0, target.height, rows):
-            target.scissor = (0, bottom, target.width, rows)
+        rows = max(1, SAMPLES_AT_ONCE // width)
+        for bottom in range(0, height, rows):
+            target.scissor = (0, bottom, width, min(rows, height - bottom))
             self.light_maps.bind()
             self.solids.draw(scene, camera, target, uniforms, self.outline.of(scene), prepared.options, samples)
             target.scissor = None  # type: ignore[assignment]
-            yield 0.05 * bottom / target.height
+            yield 0.05 * bottom / height
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
         total, before = max(sum(len(order) for order in orders), 1), 0.0
         for textures, order, points in zip(drawn, orders, pieces, strict=True):
@@ -197,25 +203,31 @@ class Renderer:
                 yield 0.05 + before + part * share
             before += share
 
-    def _tile_target(self, width: int, height: int) -> moderngl.Framebuffer:
-        found = next((tile for tile in self.tiles if tile.light.size == (width, height)), None)
-        if found is None:
-            for old in self.tiles[TILES_KEPT - 1 :]:
-                old.release()
-            light = self.ctx.texture((width, height), 4, dtype="f2")
-            light.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            depth = self.ctx.depth_renderbuffer((width, height))
-            found = _Tile(light, depth, self.ctx.framebuffer([light], depth))
-        self.tiles = [found, *(tile for tile in self.tiles if tile is not found)][:TILES_KEPT]
-        return found.target
+    def _make_room(self, width: int, height: int) -> Iterator[float]:
+        """See to a tile of at least so many samples, in steps."""
+        wide, high = (-(-side // TILE_STEP) * TILE_STEP for side in (width, height))
+        if self.tile is not None:
+            have = self.tile.light.size
+            if have[0] >= width and have[1] >= height and have[0] * have[1] <= MUCH_TOO_LARGE * wide * high:
+                return
+            self.tile.release()
+            self.tile = None
+        light = self.ctx.texture((wide, high), 4, dtype="f2")
+        light.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        yield 0.0
+        depth = self.ctx.depth_renderbuffer((wide, high))
+        self.tile = _Tile(light, depth, self.ctx.framebuffer([light], depth))
+        yield 0.0
 
     def release(self) -> None:
         """Give back everything; the context must be current."""
-        things: list[Any] = [*self.tiles, *self.coats, *self.guides, self.backdrop, self.solids]
+        if self.tile is not None:
+            self.tile.release()
+        things: list[Any] = [*self.coats, *self.guides, self.backdrop, self.solids]
         things += [self.light_maps, self.ribbons, self.strand_programs, self.guide_programs]
         for thing in things:
             thing.release()
-        self.coats, self.guides, self.tiles = [], [], []
+        self.coats, self.guides, self.tile = [], [], None
 
 
 def _scaled(steps: Any, low: float, high: float) -> Generator[float, None, Any]:

@@ -125,7 +125,7 @@ class Ribbons:
             strands.colors.use(2)
             set_uniforms(vertices.program, {
                 "strand_sides": 1, "strand_colors": 2, "clip_from_world": clip_from_world,
-                "picture_size": (float(target.width), float(target.height)), "samples_per_pixel": float(samples),
+                "picture_size": tuple(map(float, target.viewport[2:])), "samples_per_pixel": float(samples),
                 "strands_across": across, "margin": 0.0,
             })
             vertices.render(moderngl.TRIANGLES, vertices=numbers.size)

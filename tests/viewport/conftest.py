@@ -36,8 +36,10 @@ def draw(ctx: moderngl.Context) -> Iterator[Callable[..., np.ndarray]]:
         renderer.draw(scene, camera, target, (width, height))
         target.release()
         color.release()
-        raw = np.frombuffer(renderer.tiles[0].light.read(), np.float16).astype(np.float64)
-        return raw.reshape(height, width, 4)[::-1]
+        assert renderer.tile is not None
+        wide, high = renderer.tile.light.size
+        raw = np.frombuffer(renderer.tile.light.read(), np.float16).astype(np.float64)
+        return raw.reshape(high, wide, 4)[:height, :width][::-1]
 
     yield call
     renderer.release()
