@@ -33,7 +33,8 @@ from tools.match_edits import select_tracks, selected_tracks, shown_plate
 
 MOST_ROWS = 12
 ROLE = Qt.ItemDataRole.UserRole
-HEADS = ("Track", "Frames", "Error", "Likeness", "Seen")
+HEADS = ("Track", "Frames", "Error", "Like", "Seen")
+TO_THE_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 TIPS = (
     "Tracks of the plate, the worst first. A click selects one and goes to its worst frame.",
     "On how many frames the track is seen.",
@@ -188,9 +189,9 @@ class _Tracks(QTreeWidget):
             item = QTreeWidgetItem([f"{track.name}{state}", f"{len(track.frames)}", f"{error:.2f}", f"{score:.2f}"])
             item.setData(0, ROLE, track.id)
             item.setData(len(HEADS) - 1, ROLE, (track, plate))
-            item.setTextAlignment(1, Qt.AlignmentFlag.AlignRight)
+            item.setTextAlignment(1, TO_THE_RIGHT)
             for place, poor in ((2, error > POOR), (3, score < UNLIKE)):
-                item.setTextAlignment(place, Qt.AlignmentFlag.AlignRight)
+                item.setTextAlignment(place, TO_THE_RIGHT)
                 if poor:
                     item.setForeground(place, theme.colour("trouble_text"))
             items.append(item)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import moderngl
 import numpy as np
@@ -18,11 +18,13 @@ from app.window.match_pattern import patches
 from app.window.match_screen import PlateScreen, Shown
 from app.window.match_tracking import MatchTracking
 from core.image.plate_view import pixels_per_pixel, plate_size
-from core.overlay import Overlays, Polyline
+from core.overlay import Fill, Overlays, Polyline
 from tools.match_edits import place_at, selected_tracks
 from tools.tool import Pointer
 from viewport.plate import Box, PlatePicture
 from viewport.view import HudLine, View3D
+
+LETTER, LINE_HEIGHT = 6.6, 16.5  # pixels of Qt's
 
 
 class PlateView(QObject):
@@ -72,9 +74,10 @@ class PlateView(QObject):
         box = self._box(sheet)
         small = patches(self.desk.document, self.screen, sheet, pointer)
         marks += small.marks
+        words = self._words(shown, frame)
         self._picture.present(
-            framebuffer, size, None if shown is None else shown.pixels, box, marks + over, self._words(shown, frame),
-            ratio, small.insets)
+            framebuffer, size, None if shown is None else shown.pixels, box,
+            (*ground_of(words, ratio), *marks, *over), words, ratio, small.insets)
 
     def release(self) -> None:
         """Give back what is on the graphics card, its context current."""
@@ -123,3 +126,11 @@ class PlateView(QObject):
         self.eye.forget()
         self.screen.close()
 
+
+def ground_of(words: Sequence[HudLine], ratio: float) -> Overlays:
+    """Darkness behind the words in the corner, so that they are read on every plate."""
+    if not words:
+        return ()
+    longest = max(len(line if isinstance(line, str) else line[0]) for line in words)
+    right, bottom = 26.0 + LETTER * longest, 22.0 + LINE_HEIGHT * len(words)
+    return (Fill(6.0 * ratio, 6.0 * ratio, right * ratio, bottom * ratio, 0.55),)

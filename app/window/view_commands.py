@@ -258,10 +258,14 @@ def _end_here(window: Window) -> None:
     window.desk.edit("Frame range", set_document, first_frame=min(frame, document.first_frame), last_frame=frame)
 
 
+def _needs_frames(desk: Desk) -> str | None:
+    return None if desk.session.document.plates else _needs_something(desk)
+
+
 FRAME: tuple[Command, ...] = (
     Command(
         "frame.play", "Play / pause", "Plays the frames of the timeline in a loop, at the project's rate.",
-        lambda w: w.toggle_playback(), _WORKSPACE, "window", enabled=_needs_something, icon="play", scope="viewport",
+        lambda w: w.toggle_playback(), _WORKSPACE, "window", enabled=_needs_frames, icon="play", scope="viewport",
         words="animation stop start"),
     Command(
         "frame.next", "Next frame", "Goes one frame on, at most to the last of the timeline.",

@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from app.window.commands import Command
+from app.window.match_commands import MATCH
 from core.document import Document
+from core.image.plate import Plate
 from core.image.plate_view import view_points
+from core.match.track import keyed_track
 from tests.window.conftest import Opened
 from tests.window.hand import LEFT, NONE, Hand
+from tests.window.host import Host
+from tools import match_edits as edits
 
 WIDTH, HEIGHT, FIRST, COUNT = 240, 160, 1001, 10
 STEP = np.array([2.3, -0.7])  # pixels from frame to frame
@@ -83,3 +89,69 @@ def test_a_point_is_placed_followed_saved_and_opened_again(opened: Opened, plate
     hand.rest()
     assert np.array_equal(desk.document.tracks[0].points, track.points)
     assert hand.window.match.shown
+
+
+EDITS = [c for c in MATCH if c.undo is not None and c.twin != "core.match.tracker.Tracking"]
+BEFORE = {"match.show_all": "match.hide", "match.select_all": "match.select_none"}
+
+
+@pytest.mark.parametrize("command", EDITS, ids=lambda c: c.name)
+def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Host) -> None:
+    rows = np.column_stack((np.arange(11.0, 21.0), np.random.default_rng(1).random((10, 2)) * 9.0 + 50.0))
+    tracks = tuple(keyed_track(n, f"t{n}", rows + np.array([0.0, n, n]), 1) for n in (1, 2))
+    film = Plate(id=1, name="p", path="nothing.####.png", first=11, last=20, width=200, height=100)
+    document = edits.put_tracks(edits.add_plate(host.desk.document, film), tracks)
+    host.desk.session.commit("Tracks", edits.select_tracks(document, (1, 2)))
+    host.desk.set_workspace(frame=15.0)
+    if command.name in BEFORE:
+        assert host.commands.run(BEFORE[command.name]), host.failed
+    before = host.desk.document
+    assert host.commands.run(command.name), host.failed
+    assert host.desk.document is not before
+    assert host.desk.session.history.undo_name == command.undo
+    host.commands.run("edit.undo")
+    assert host.desk.document is before
+
+
+def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    view, eye, desk = hand.view, hand.window.match.eye, hand.window.desk
+    for notches, corner in ((0, (0.5, 0.5)), (8, (0.4, 0.6)), (12, (0.55, 0.35)), (-14, (0.5, 0.5))):
+        width, height = view.pixels()
+        pixel_there = (corner[0] * width, corner[1] * height)
+        before = eye.under(*pixel_there)
+        view.eye.wheel("dolly", notches, *pixel_there)
+        assert np.allclose(eye.under(*pixel_there), before, atol=1e-6), "what is under the pointer stays there"
+        place = np.array([120.0, 80.0]) + 3.0 * notches
+        eye.look_at(place)
+        hand.painted()
+        click(hand, place)
+        made = desk.document.tracks[-1]
+        half_a_pixel = 0.5 * eye.camera.height / height * view.devicePixelRatio() + 1e-9
+        assert np.abs(made.points[0] - place).max() <= 1.01 * half_a_pixel
+        # the picture itself is where picking says: the colour under the click is that of the frame
+        shown = hand.window.match.screen.pixels(desk.document.plates[0], eye.frame)
+        assert shown is not None
+        if notches > 0:
+            hand.window.commands.run("match.hide")
+            view._pointer = None
+            view.redraw()
+            hand.painted()
+            image = view.grabFramebuffer()
+            color = image.pixelColor(pixel(hand, np.round(place)))
+            truth = shown[round(place[1]), round(place[0])]
+            assert np.abs(np.array([color.red(), color.green(), color.blue()]) - truth).max() <= 2
+    assert len(desk.document.tracks) == 4
+
+
+def test_cancelled_tracking_leaves_everything_as_it_was(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk = hand.window.desk
+    click(hand, START)
+    before = desk.document
+    hand.window.commands.run("match.forward")
+    (job,) = [j for j in desk.jobs.running if j.name == "Track forward"]
+    desk.jobs.cancel(job)
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    assert desk.document is before
+    assert hand.window.match.tracking.tails() == []
