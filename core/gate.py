@@ -56,8 +56,8 @@ def seen_through(gate: Gate, camera: Camera) -> Camera:
     if gate.orthographic != camera.orthographic:
         return camera
     if gate.orthographic:
-        return camera.replace(height=gate.height)  # type: ignore[no-any-return]
-    return camera.replace(field_of_view=float(2.0 * np.arctan(0.5 * gate.height)))  # type: ignore[no-any-return]
+        return camera.replace(height=gate.height)
+    return camera.replace(field_of_view=float(2.0 * np.arctan(0.5 * gate.height)))
 
 
 def gate_box(gate: Gate, camera: Camera, width: int, height: int) -> Box | None:
