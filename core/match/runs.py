@@ -34,6 +34,8 @@ ROBUST_ABOVE = 1.8  # times the variance a run is used to
 LOOSE, STRICT = 6.0, 2.5  # the same, still believed: where it was foretold, and anywhere else
 ALIKE = 0.95  # score of a new pattern that is believed whatever its residuals are
 RETURN = 0.25  # pixels a pattern found after a jump may miss the place it came from
+SPOILT = 4.0  # times the noise of the key: more than that is not usual
+LED = 3.0  # pixels off the place its neighbours tell, for every frame out of sight
 SURPRISE = 2.0  # pixels off the place foretold
 UNSURE = 1.0  # pixels, standard deviation
 NEIGHBOURS = 5
@@ -76,7 +78,7 @@ class Runs:
         self.usual, self.likeness, self.lag = np.zeros(0), np.zeros(0), np.zeros(0)  # of the frames before
         self.age, self.missed = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self.size, self.stop = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.alive, self.guided = np.zeros(0, np.bool_), np.zeros(0, np.bool_)
+        self.alive, self.guided, self.led = np.zeros(0, np.bool_), np.zeros(0, np.bool_), np.zeros(0, np.bool_)
         self._hold = NO_HOLD
         self._before: Image | None = None  # the frame before, where the runs were
 
@@ -119,7 +121,7 @@ class Runs:
             "lag": np.full(count, WHITE),
             "age": np.zeros(count, np.int64), "missed": np.zeros(count, np.int64),
             "size": np.full(count, size, np.int64), "stop": stop, "alive": np.ones(count, np.bool_),
-            "guided": np.zeros(count, np.bool_),
+            "guided": np.zeros(count, np.bool_), "led": np.zeros(count, np.bool_),
         }  # fmt: skip
         for name, value in fresh.items():
             setattr(self, name, np.concatenate((getattr(self, name), value)))
@@ -137,6 +139,7 @@ class Runs:
         told = self._foretell(rows)
         warp, light = told.copy(), self.light.copy()
         self._blur(rows, told)
+        self.led[:] = False
         fresh = rows[self.age[rows] == 0]
         self._look(image, fresh, warp)
         found = self._fit(image, rows, warp, light, np.zeros(len(self.alive)))
@@ -144,9 +147,12 @@ class Runs:
         doubt = ~good | (found[rows, COLUMN["variance"]] > ROBUST_ABOVE * self.usual[rows])
         if doubt.any():
             sure, doubtful = rows[~doubt], rows[doubt]
+            self._lead(doubtful[self.missed[doubtful] > 0], sure, told, warp)
             self._again(image, doubtful, told, told, warp, light, found)
             lost = ~self._judge(doubtful, found, warp, told)
-            unsure = doubtful[lost | (self.age[doubtful] == 0)]
+            # a fit that is believed and still poor may sit beside the true place
+            poor = found[doubtful, COLUMN["variance"]] > ROBUST_ABOVE * self.usual[doubtful]
+            unsure = doubtful[lost | poor | (self.age[doubtful] == 0)]
             for place in self._places(image, unsure, sure, told, warp):
                 self._again(image, unsure, place, told, warp, light, found)
             good = self._judge(rows, found, warp, told)
@@ -222,12 +228,14 @@ class Runs:
         fresh, guided = (self.age[rows] == 0) & (missed == 0), self.guided[rows]
         calm = (off < SURPRISE) & (missed == 0) & ~guided
         like = score > np.where(fresh, 0.8, self.likeness[rows] - 0.1)
-        near = (variance < LOOSE * usual) | (score > self.likeness[rows] - 0.05)
+        near = variance < LOOSE * usual
         alike = np.where(guided, ALIKE - 0.2, ALIKE)  # the matches are witnesses too
-        anywhere = (variance < np.where(fresh, LOOSE, STRICT) * usual) | ((fresh | guided) & (score > alike))
+        # what came to be usual while something passed before it is no measure for taking it back
+        clean = np.minimum(usual, SPOILT * self.templates.noise[rows])
+        anywhere = (variance < np.where(fresh, LOOSE, STRICT) * clean) | ((fresh | guided) & (score > alike))
         good = (f[:, COLUMN["iterations"]] > 0) & (f[:, COLUMN["step"]] < 0.1) & (f[:, COLUMN["share"]] > 0.4)
         good &= (score >= self.settings.least_score) & (spread < UNSURE) & (f[:, COLUMN["gain"]] > 0.05)
-        good &= off < 1.5 * self.settings.search + 1.0
+        good &= off < np.where(self.led[rows], LED * (1.0 + missed), 1.5 * self.settings.search + 1.0)
         room = 1.4 * (1.0 + 0.1 * missed)
         good &= (ratio > 1.0 / room) & (ratio < room)
         return good & np.where(calm, near, anywhere & like)
@@ -304,6 +312,16 @@ class Runs:
         )  # fmt: skip
         off = np.linalg.norm(back[:, :2] - start, axis=1)
         return np.asarray((off < RETURN) & (found[:, COLUMN["step"]] < 0.1) & (found[:, COLUMN["iterations"]] > 0))
+
+    def _lead(self, rows: Rows, sure: Rows, told: Reals, warp: Reals) -> None:
+        """Foretell rows that are out of sight by what their neighbours did, where there are enough of them."""
+        if len(sure) < NEIGHBOURS:
+            return
+        error = warp[sure, :2] - told[sure, :2]
+        for n in rows:
+            distance = np.linalg.norm(told[sure, :2] - told[n, :2], axis=1)
+            told[n, :2] += np.median(error[np.argsort(distance)[:NEIGHBOURS]], axis=0)
+            self.led[n] = True
 
     def _places(self, image: Image, rows: Rows, sure: Rows, told: Reals, warp: Reals) -> list[Reals]:
         """Where else rows may be: the likeliest peaks around the places that what their neighbours did foretells."""
