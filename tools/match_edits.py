@@ -11,7 +11,7 @@ from core.document import FRAMES, Document, free_id
 from core.errors import UserError
 from core.image.plate import Plate
 from core.match import edits
-from core.match.track import Track
+from core.match.track import PlaneTrack, Track
 from core.record import freeze
 
 
@@ -191,6 +191,25 @@ def nudge(document: Document, ids: tuple[int, ...], frame: int, x: float, y: flo
             raise UserError(f"Track {track.name} is not seen on frame {frame}; drag it to its place there.")
         made.append(edits.key_track(track, frame, (float(place[0] + x), float(place[1] + y))))
     return put_tracks(document, tuple(made))
+
+
+def put_planes(document: Document, planes: tuple[PlaneTrack, ...]) -> Document:
+    """The document with these planes in place of those of their ids."""
+    by_id = {plane.id: plane for plane in planes}
+    changed: Document = document.replace(planes=tuple(by_id.get(p.id, p) for p in document.planes))
+    return changed
+
+
+def delete_shapes(document: Document, frame: int) -> Document:
+    """The document without the planes and masks of the plate in view that are seen on a frame and not locked."""
+    plate = shown_plate(document)
+    here = 0 if plate is None else plate.id
+    planes = tuple(p for p in document.planes if p.plate_id != here or p.locked or frame not in p.frames)
+    masks = tuple(m for m in document.masks if m.plate_id != here or m.locked)
+    if len(planes) == len(document.planes) and len(masks) == len(document.masks):
+        raise UserError("There is no plane or mask here that could be deleted.")
+    changed: Document = document.replace(planes=planes, masks=masks)
+    return changed
 
 
 def _all_put(tracks: tuple[Track, ...], new: tuple[Track, ...]) -> tuple[Track, ...]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +22,10 @@ from core.image.plate import Plate
 from core.image.plate_view import plate_size
 from core.match.follow import Stretch, Way, stretch_of, with_found
 from core.match.outline import Mask, held_off
-from core.match.track import Track, TrackSettings
+from core.match.plane_tracker import plane_steps
+from core.match.track import PlaneTrack, Track, TrackSettings
 from core.match.tracker import Step, Tracking
-from tools.match_edits import add_tracks, put_tracks, selected_tracks, shown_plate
+from tools.match_edits import add_tracks, put_planes, put_tracks, selected_tracks, shown_plate
 
 STEPS = {
     "forward": "Track forward", "backward": "Track backward", "next": "Track one frame on",
@@ -41,38 +44,57 @@ class Work:
         cancelled: Asked,
     ) -> tuple[Track, ...]:
         """Follow what is to be followed; every step goes to `steps` at once."""
-        plate = self.plate
-        width, height = plate_size(plate)
+        frames = range(min(t.frames[0] for t in tasks), max(t.frames[-1] for t in tasks) + 1) if tasks \
+            else self.plate.frames
+        groups: dict[tuple[Any, ...], tuple[TrackSettings, list[Track]]] = {}
+        for one in tasks:  # tracks of the same settings are followed together, in one pass through the plate
+            own = one.task.settings or settings
+            values = tuple(getattr(own, name) for name in TrackSettings.__struct_fields__)
+            groups.setdefault(values, (own, []))[1].append(one.task)
+        made: tuple[Track, ...] = ()
+        with self._opened(cancelled) as read:
+            for number, (own, tracks) in enumerate(groups.values() if groups else ((settings, []),)):
+                tracking = Tracking(read, frames, tuple(tracks), own, auto=auto, hold=self._held)
+                for step in tracking.steps():
+                    steps.append(step)
+                    progress((number + step.done / step.total) / max(1, len(groups)))
+                made += tracking.tracks()
+        return made
+
+    def follow_planes(
+        self, planes: tuple[PlaneTrack, ...], progress: Progress, cancelled: Asked
+    ) -> tuple[PlaneTrack, ...]:
+        """Follow planes from their keys through the plate."""
+        made, count = [], len(self.plate.frames)
+        with self._opened(cancelled) as read:
+            for number, plane in enumerate(planes):
+                for done, step in enumerate(plane_steps(plane, read, self.plate.frames, hold=self._held)):
+                    plane = step
+                    progress(min((number + done / count) / len(planes), 1.0))
+                made.append(plane)
+        return tuple(made)
+
+    @contextmanager
+    def _opened(self, cancelled: Asked) -> Iterator[Callable[[int], NDArray[np.float32] | None]]:
+        """What reads the frames as tracking looks at them, and ends with a cancelled job."""
         decoder = FrameDecoder()
-        source = PlateFrames(plate, decoder, root=self.root)
-        frames = range(min(t.frames[0] for t in tasks), max(t.frames[-1] for t in tasks) + 1) if tasks else plate.frames
+        source = PlateFrames(self.plate, decoder, root=self.root)
 
         def read(frame: int) -> NDArray[np.float32] | None:
             if cancelled():
                 raise Cancelled
             pixels = source.get(frame)
-            return None if pixels is None else mixed(pixels, plate.mix)
+            return None if pixels is None else mixed(pixels, self.plate.mix)
 
-        def hold(frame: int) -> NDArray[np.bool_] | None:
-            return held_off(self.masks, frame, height, width)
-
-        groups: dict[TrackSettings, list[Track]] = {}
-        for one in tasks:
-            own = one.task.settings or settings
-            group = next((known for known in groups if known == own), own)
-            groups.setdefault(group, []).append(one.task)
-        made: tuple[Track, ...] = ()
         try:
-            for number, (own, tracks) in enumerate(groups.items() if groups else ((settings, []),)):
-                tracking = Tracking(read, frames, tuple(tracks), own, auto=auto, hold=hold)
-                for step in tracking.steps():
-                    steps.append(step)
-                    progress((number + step.done / step.total) / max(1, len(groups)))
-                made += tracking.tracks()
-            return made
+            yield read
         finally:
             source.close()
             decoder.close()
+
+    def _held(self, frame: int) -> NDArray[np.bool_] | None:
+        width, height = plate_size(self.plate)
+        return held_off(self.masks, frame, height, width)
 
 
 class MatchTracking(QObject):
@@ -145,6 +167,22 @@ class MatchTracking(QObject):
 
         self._start("Automatic features", plate, (), TrackSettings(), count, done)
 
+    def track_planes(self) -> None:
+        """Follow every plane of the plate that is not locked or hidden through the plate."""
+        document, plate = self.desk.document, shown_plate(self.desk.document)
+        planes = tuple(p for p in document.planes if plate is not None and p.plate_id == plate.id
+                       and not (p.locked or p.hidden))
+        if plate is None or not planes:
+            raise UserError("There is no plane to track; draw one with Track plane.")
+        self._one_at_a_time()
+
+        def done(found: tuple[PlaneTrack, ...]) -> None:
+            self._forget()
+            self.desk.edit("Track planes", put_planes, found)
+
+        work = self._work(plate)
+        self._begin("Track planes", lambda progress, cancelled: work.follow_planes(planes, progress, cancelled), done)
+
     def _stretches(
         self, tracks: list[Track], frame: int, way: Way, plate: Plate, lenient: bool
     ) -> dict[int, Stretch]:
@@ -162,13 +200,19 @@ class MatchTracking(QObject):
     def _start(
         self, name: str, plate: Plate, tasks: tuple[Stretch, ...], settings: TrackSettings, auto: int, done: Any
     ) -> None:
-        path = self.desk.session.path
-        masks = tuple(m for m in self.desk.document.masks if m.plate_id == plate.id)
-        work = Work(plate, None if path is None else path.parent, masks)
+        work = self._work(plate)
         steps: deque[Step] = deque()
         self._forget()
         self._steps = steps
+        self._begin(
+            name, lambda progress, cancelled: work.run(tasks, settings, auto, steps, progress, cancelled), done)
 
+    def _work(self, plate: Plate) -> Work:
+        path = self.desk.session.path
+        masks = tuple(m for m in self.desk.document.masks if m.plate_id == plate.id)
+        return Work(plate, None if path is None else path.parent, masks)
+
+    def _begin(self, name: str, function: Callable[[Progress, Asked], Any], done: Callable[[Any], None]) -> None:
         def failed(error: Exception) -> None:
             self._forget()
             if isinstance(error, Cancelled):
@@ -176,9 +220,7 @@ class MatchTracking(QObject):
             else:
                 self.desk.error(error)
 
-        self.job = self.desk.jobs.start(
-            name, lambda progress, cancelled: work.run(tasks, settings, auto, steps, progress, cancelled), done, failed,
-            self)
+        self.job = self.desk.jobs.start(name, function, done, failed, self)
 
     def _one_at_a_time(self) -> None:
         if self.running:

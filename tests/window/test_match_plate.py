@@ -16,7 +16,9 @@ from app.window.match_commands import MATCH
 from core.document import Document
 from core.image.plate import Plate
 from core.image.plate_view import view_points
-from core.match.track import keyed_track
+from core.match.outline import Mask
+from core.match.track import carried_points, keyed_track
+from core.record import freeze
 from tests.window.conftest import Opened
 from tests.window.hand import LEFT, NONE, Hand
 from tests.window.host import Host
@@ -91,7 +93,7 @@ def test_a_point_is_placed_followed_saved_and_opened_again(opened: Opened, plate
     assert hand.window.match.shown
 
 
-EDITS = [c for c in MATCH if c.undo is not None and c.twin != "core.match.tracker.Tracking"]
+EDITS = [c for c in MATCH if c.undo is not None and not c.twin.startswith("core.match")]
 BEFORE = {"match.show_all": "match.hide", "match.select_all": "match.select_none"}
 
 
@@ -101,6 +103,9 @@ def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Ho
     tracks = tuple(keyed_track(n, f"t{n}", rows + np.array([0.0, n, n]), 1) for n in (1, 2))
     film = Plate(id=1, name="p", path="nothing.####.png", first=11, last=20, width=200, height=100)
     document = edits.put_tracks(edits.add_plate(host.desk.document, film), tracks)
+    shape = freeze(np.array([[[5.0, 5.0], [50.0, 5.0], [5.0, 50.0]]]))
+    mask = Mask(id=1, name="m", frames=freeze(np.array([11], np.int32)), points=shape, plate_id=1)
+    document = document.replace(masks=(mask,))
     host.desk.session.commit("Tracks", edits.select_tracks(document, (1, 2)))
     host.desk.set_workspace(frame=15.0)
     if command.name in BEFORE:
@@ -144,7 +149,7 @@ def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:
     assert len(desk.document.tracks) == 4
 
 
-def test_cancelled_tracking_leaves_everything_as_it_was(opened: Opened, plate: Path) -> None:
+def test_cancelled_tracking_leaves_all_as_it_was_and_a_plane_is_pinned(opened: Opened, plate: Path) -> None:
     hand = opened_plate(opened, plate)
     desk = hand.window.desk
     click(hand, START)
@@ -155,3 +160,19 @@ def test_cancelled_tracking_leaves_everything_as_it_was(opened: Opened, plate: P
     hand.until(lambda: not desk.jobs.running, 240_000)
     assert desk.document is before
     assert hand.window.match.tracking.tails() == []
+    desk.choose("track_plane")
+    press, release = pixel(hand, np.array([60.0, 50.0])), pixel(hand, np.array([110.0, 100.0]))
+    QTest.mousePress(hand.view, LEFT, NONE, press)
+    QTest.mouseMove(hand.view, release)
+    hand.painted()
+    QTest.mouseRelease(hand.view, LEFT, NONE, release)
+    hand.painted()
+    (plane,) = desk.document.planes
+    assert np.abs(plane.corners[[0, 2]] - [[60.0, 50.0], [110.0, 100.0]]).max() < 1.0
+    hand.window.commands.run("match.planes")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    (plane,) = desk.document.planes
+    assert list(plane.frames) == list(range(FIRST, FIRST + COUNT))
+    pinned = carried_points(plane, FIRST + COUNT - 1, plane.corners)
+    assert pinned is not None
+    assert np.abs(pinned - plane.corners - STEP * (COUNT - 1)).max() < 0.2
