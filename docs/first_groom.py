@@ -138,7 +138,7 @@ def _look(hand: Hand, folder: Path) -> None:
 
 
 NECK: tuple[Place, ...] = ((0.715, 0.29), (0.68, 0.36), (0.645, 0.42), (0.60, 0.455), (0.55, 0.47))
-LOCK, RUMP = (0.63, 0.47), (0.33, 0.53)
+LOCK, RUMP = (0.60, 0.56), (0.36, 0.52)
 
 
 def _scatter(hand: Hand, folder: Path) -> None:
@@ -154,7 +154,7 @@ def _length(hand: Hand, folder: Path) -> None:
     hand.key(Qt.Key.Key_L)
     size_of_brush(hand, 50)
     type_number(hand, ToolPanel, "strength", "1")
-    sweep(hand, *NECK[:4], *NECK[2::-1])
+    sweep(hand, *NECK[::-1])
     hand.rest()
 
 
@@ -241,8 +241,8 @@ STEPS: tuple[Step, ...] = (
         _scatter, ("Scatter",)),
     Step(
         "Grow it",
-        "**L** takes Length; **F**, `50`, **Return**, and type `1` into *Strength*. Drag down the neck and up again "
-        "without letting go: every pass makes hair half as long again. With **Ctrl** it shrinks.",
+        "**L** takes Length; **F**, `50`, **Return**, and type `1` into *Strength*. Drag up the neck, from the "
+        "back to the ears and against the hair: a pass makes it half as long again. With **Ctrl** it shrinks.",
         _length, ("Length",)),
     Step(
         "Comb it",
@@ -256,8 +256,8 @@ STEPS: tuple[Step, ...] = (
         _cut, ("Cut",)),
     Step(
         "Clone a lock",
-        "**D** takes Clone. Click *Whole lock* at the right; **F**, `30`, **Return**. Click on the neck to pick "
-        "the lock under the ring, then click on the rump to stamp it there.",
+        "**D** takes Clone. Click *Whole lock* at the right; **F**, `30`, **Return**. Click on the shoulder to "
+        "pick the lock under the ring, then click on the rump to stamp it there: a tuft that lies another way.",
         _clone, ("Clone",)),
     Step(
         "Hairspray",
