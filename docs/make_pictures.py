@@ -31,6 +31,7 @@ from tests.display import ensure_display
 
 PICTURES = Path(__file__).parent / "pictures"
 CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's meshes, CC BY 4.0
+SINTEL = Path("matchmove/seq_sintel_raft/demo-frames")  # Blender Foundation, CC BY 3.0
 FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"  # the chapter made of its steps stands between
 STYLES = ("short", "fur", "long", "mane")
 
@@ -80,6 +81,32 @@ def first_pose() -> None:
     manual.write_text(before + FIRST_POSE[0] + chapter() + FIRST_POSE[1] + after, "utf-8")
 
 
+def match_window(plate: Path) -> None:
+    """A plate in the window with automatic tracks, one of them selected."""
+    ensure_display()  # before anything of Qt is made
+    from app.window.screenshot import window_image
+    from tests.window.alone import hand_at
+    from tests.window.take_pictures import reduced
+    from tools.match_edits import select_tracks
+
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
+        hand = hand_at(None, (1600, 1000))
+        desk = hand.window.desk
+        hand.window.opening.open(plate)
+        hand.until(lambda: bool(desk.document.plates), 60_000)
+        hand.rest()
+        hand.window.commands.run("match.features")
+        hand.until(lambda: not desk.jobs.running, 240_000)
+        desk.set_workspace(frame=float(desk.document.first_frame + 2))
+        far = max(desk.document.tracks, key=lambda t: float(np.abs(t.points[-1] - t.points[0]).max()))
+        desk.edit("Select tracks", select_tracks, (far.id,))
+        hand.rest()
+        image = reduced(window_image(hand.window), 0.75)
+        cv2.imwrite(str(PICTURES / "match-window.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        hand.window.close_unasked()
+
+
 def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     first_groom()
@@ -98,6 +125,7 @@ def main() -> None:
     if not data:
         print("FILOPLUME_DATA is not set: the pictures of the cat stay as they are")
         return
+    match_window(Path(data) / SINTEL)
     mesh = read_mesh(Path(data) / CAT, unit="m", up="y").mesh
     made = []
     for name in STYLES:
