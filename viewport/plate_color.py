@@ -57,7 +57,7 @@ class PlateColors:
                 view = ocio.DisplayViewTransform(
                     src=color_space, display=display, view=config.getDefaultView(display))
                 self._processors[color_space] = config.getProcessor(view).getDefaultCPUProcessor()
-            except ocio.Exception as error:
+            except (ocio.Exception, ocio.ExceptionMissingFile) as error:
                 raise UserError(
                     f"The colours of the plate cannot be shown ({' '.join(str(error).split())[:160].rstrip('.')}); "
                     "look at the OCIO variable and at the plate's colour space.") from None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from app.window.desk import Desk
+from app.window.jobs import Cancelled
 from core.formats.frame_decoder import FrameDecoder
 from core.formats.plate_file import PlateFrames
 from core.image.frame_cache import FrameCache, no_pixels
@@ -117,6 +118,8 @@ class PlateScreen(QObject):
         def failed(error: Exception) -> None:
             if self._reel is reel:
                 self._asked = None
+                if not isinstance(error, Cancelled):
+                    self._desk.error(error)
 
         self._desk.jobs.start(
             f"Read frame {frame}", lambda progress, cancelled: reel.frames.get(frame), done, failed, self)
