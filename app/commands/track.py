@@ -12,11 +12,13 @@ from app.report import Report, peak_megabytes
 from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
+from core.formats.mask_file import read_masks
 from core.formats.plate_file import PlateFrames, read_plate
 from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.mix import mixed
 from core.image.plate import ChannelMix
+from core.match.outline import held_off
 from core.match.track import MODELS, Track, TrackSettings
 from core.match.tracker import Tracking
 from core.workers import Workers
@@ -26,6 +28,7 @@ def command(
     plate: Annotated[str, typer.Argument(help="A folder of frames, a pattern like plate.####.exr, or a movie.", show_default=False)],
     tracks: Annotated[Path | None, typer.Option(help="Keys to follow: .json, or a file of another program.")] = None,
     tracks_out: Annotated[Path | None, typer.Option(help="Where the tracks go; the suffix says how.")] = None,
+    masks: Annotated[Path | None, typer.Option(help="Outlines that hold tracks off, keyed over frames: .json.")] = None,
     auto: Annotated[int, typer.Option(min=0, max=20_000, help="Find so many features and keep as many alive.")] = 0,
     pattern: Annotated[int, typer.Option(min=7, max=201, help="Side of the pattern in pixels.")] = 21,
     search: Annotated[int, typer.Option(min=2, max=500, help="How far around the place foretold to look, in pixels.")] = 30,
@@ -55,6 +58,7 @@ def command(
                 span = _span(frames, film.frames)
                 given = read_tracks(tracks, size=(film.width, film.height)) if tracks is not None else Tracks(())
                 keyed = _keyed(given, (film.width, film.height), span, warnings)
+                shapes = read_masks(masks) if masks is not None else ()
             mix = ChannelMix(channels="grey" if grey else "rgb", log=log, denoise=denoise, contrast=contrast)
             source = PlateFrames(film, decoder)
             settings = TrackSettings(pattern=pattern | 1, search=search, model=model, blur=blur)
@@ -63,7 +67,10 @@ def command(
                 pixels = source.get(frame)
                 return None if pixels is None else mixed(pixels, mix)
 
-            tracking = Tracking(read, span, keyed, settings, auto=auto, ranges=workers.ranges)
+            def hold(frame: int) -> Any:
+                return held_off(shapes, frame, film.height, film.width)
+
+            tracking = Tracking(read, span, keyed, settings, auto=auto, ranges=workers.ranges, hold=hold)
             with telling.stage("track", "tracking"):
                 begin = time.perf_counter()
                 for step in tracking.steps():

@@ -59,10 +59,14 @@ def test_keys_are_followed_in_the_numbers_of_the_files(plate, tmp_path):
     assert 'src="http' not in text
 
 
-def test_features_are_found_by_themselves(plate):
-    code, words, _ = filoplume("track", plate, "--auto", "10", "--json")
+def test_features_are_found_by_themselves_and_masks_hold_them_off(plate, tmp_path):
+    masks, out = tmp_path / "masks.json", tmp_path / "out.json"
+    left = [[-1, -1], [80, -1], [80, 130], [-1, 130]]
+    masks.write_text(json.dumps({"masks": [{"keys": [[1001, left]]}]}))
+    code, words, _ = filoplume("track", plate, "--auto", "10", "--masks", masks, "--tracks-out", out, "--json")
     assert code == 0
     assert json.loads(words)["tracks"] >= 8
+    assert min(track["points"][0][1] for track in json.loads(out.read_text())["tracks"]) > 80
 
 
 def test_what_cannot_be_done_is_said(plate, tmp_path):
