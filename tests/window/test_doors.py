@@ -175,8 +175,15 @@ def test_a_dropped_project_is_opened_alone_and_strangers_are_named(
     failed = errors_of(desk)
     opening.dropped(urls(tmp_path / "song.mp3"))
     opening.dropped([QUrl("https://example.org/cat.obj")])
-    opening.dropped(urls(tmp_path))
-    assert [sentence.split(" is nothing")[0] for sentence in failed] == ["song.mp3", "What was dropped", tmp_path.name]
+    assert [sentence.split(" is nothing")[0] for sentence in failed] == ["song.mp3", "What was dropped"]
+
+
+def test_a_dropped_folder_is_a_plate(desk: Desk, tmp_path: Path) -> None:
+    plates: list[Path] = []
+    failed = errors_of(desk)
+    Opening(desk, open_plate=plates.append).dropped(urls(tmp_path))
+    assert plates == [tmp_path]
+    assert failed == []
 
 
 def test_the_doors_open_and_close_with_the_document(desk: Desk, opening: Opening, tmp_path: Path, qtbot: QtBot) -> None:
