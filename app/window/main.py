@@ -438,6 +438,7 @@ class MainWindow(QMainWindow):
         self.middle.setCurrentWidget(self.sides if something else self.doors)
         # hidden doors must not keep the view as wide as they are, nor push the column out of a small window
         self.doors.setMinimumWidth(1 if something else 0)
+        self.split.updateGeometry()  # doors that are hidden do not tell the layouts above
         self.status.show_hint()
 
     def show_saved(self) -> None:
