@@ -39,7 +39,7 @@ def drag(session, tool, places, **params):
 
 def two():
     keys = np.array([[15.0, 140.0, 100.0], [16.0, 142.0, 101.0]])
-    return keyed_track(1, "a", keys, 1), keyed_track(2, "b", keys + [0.0, 20.0, 5.0], 1)
+    return keyed_track(1, "a", keys, 1), keyed_track(2, "b", keys + np.array([0.0, 20.0, 5.0]), 1)
 
 
 def test_a_plate_brings_its_frames_and_takes_the_place_of_the_one_before():
@@ -108,10 +108,10 @@ def test_a_mask_holds_off_what_was_drawn_around_and_its_points_move():
     assert (held ^ inside).sum() < 0.05 * inside.sum()
     session.set_workspace(frame=1010.0)
     corner = mask.points[0, 0]
-    document = drag(session, "roto", [corner, corner + [8.0, 2.0]])
+    document = drag(session, "roto", [corner, corner + np.array([8.0, 2.0])])
     (moved,) = document.masks
     assert moved.frames.tolist() == [15, 20]
-    assert np.allclose(outline_at(moved, 20)[0], corner + [8.0, 2.0])
+    assert np.allclose(outline_at(moved, 20)[0], corner + np.array([8.0, 2.0]))
     assert np.allclose(outline_at(moved, 15), mask.points[0])
 
 
@@ -159,7 +159,7 @@ def test_edits_of_selected_tracks():
     assert [t.name for t in edits.split(document, (1,), 16).tracks] == ["a", "b", "ab"]
     joined = edits.join(document, (1, 2))
     assert [t.id for t in joined.tracks] == [1]
-    assert np.allclose(joined.tracks[0].points, two()[0].points + [10.0, 2.5])
+    assert np.allclose(joined.tracks[0].points, two()[0].points + np.array([10.0, 2.5]))
     mean = edits.average(document, (1, 2))
     assert len(mean.tracks) == 3
     assert mean.track_selection == (3,)
