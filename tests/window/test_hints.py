@@ -98,8 +98,7 @@ def test_a_held_key_says_what_the_buttons_do(opened: Opened, animal: Document) -
     assert not words(hand).startswith("Space held")
 
 
-@pytest.mark.parametrize("keymap", ["blender", "maya"])
-@pytest.mark.parametrize("style", ["turntable", "trackball"])
+@pytest.mark.parametrize(("style", "keymap"), [("turntable", "blender"), ("trackball", "maya")])
 def test_turning_keeps_up_or_rolls_as_preferred(opened: Opened, animal: Document, keymap: str, style: str) -> None:
     hand = opened(animal, keymap=keymap)
     window = hand.window
