@@ -17,7 +17,9 @@ def pytest_xdist_auto_num_workers() -> int:
     return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MOST_WORKERS)
 
 
-LONGEST = ("test_manual.py", "test_pictures.py", "test_cli.py", "test_start.py", "test_crash.py", "test_pose_command.py")
+LONGEST = (
+    "test_manual.py", "test_pictures.py", "test_cli.py", "test_start.py", "test_crash.py", "test_pose_command.py",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
