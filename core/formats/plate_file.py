@@ -7,8 +7,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import fileseq
-import fileseq.exceptions
 import numpy as np
 from numpy.typing import NDArray
 
@@ -135,6 +133,9 @@ def _movie(path: Path, decoder: FrameDecoder, plate_id: int) -> Plate:
 
 def _sequence(path: Path) -> tuple[str, list[int]]:
     """A pattern with #s and the numbers of its files, rising."""
+    import fileseq
+    import fileseq.exceptions
+
     if path.is_dir():
         found = [s for s in fileseq.findSequencesOnDisk(str(path)) if s.extension().lower() in PICTURES]
         if not found:

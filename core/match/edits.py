@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from core.errors import UserError
 from core.match.track import HAND, PlaneTrack, Track
@@ -55,6 +54,8 @@ def average_tracks(tracks: tuple[Track, ...]) -> Track:
 
 def smooth_track(track: Track, length: int = 5) -> Track:
     """Quadratics through `length` neighbouring frames (Savitzky & Golay 1964), within unbroken runs; keys stay."""
+    from scipy.signal import savgol_filter
+
     if length % 2 == 0 or length < 3:
         raise UserError("Smoothing needs an odd number of frames, 3 or more.")
     points = track.points.copy()
