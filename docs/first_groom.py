@@ -16,9 +16,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QFileDialog, QLineEdit, QWidget
 
 from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
+from app.window.fields.value_field import ValueField
+from app.window.files.playblast import PlayblastDialog
 from app.window.palette import Palette
-from app.window.playblast import PlayblastDialog
-from app.window.value_field import ValueField
 from tests.window.hand import CTRL, MIDDLE, NONE, SHIFT, Hand, Place
 
 SIZE = (1600, 980)

@@ -12,8 +12,8 @@ import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.window.pose_controls import PoseControls
-from app.window.pose_list import PoseList
+from app.window.pose.controls import PoseControls
+from app.window.pose.poses import PoseList
 from core.demo.pose_document import pose_document
 from core.formats.project import write_project
 from core.workspace import Workspace
@@ -42,7 +42,7 @@ def bends(hand: Hand, folder: Path) -> None:
 
 def elbow_on_screen(hand: Hand) -> tuple[float, float]:
     """Where the point of the elbow is, as fractions of the view."""
-    from app.window.pose_overlay import skeleton_of
+    from app.window.pose.overlay import skeleton_of
     from core.overlay import Circle
 
     view, names = hand.window.viewport, hand.window.desk.posed.rig.skeleton.names

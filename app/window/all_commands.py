@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from app.window.commands import Command
-from app.window.curve_commands import CURVES
-from app.window.file_commands import EDIT, FILE, MACRO
-from app.window.match_commands import MATCH, PLATE_FILES
+from app.window.files.file_commands import EDIT, FILE, MACRO
+from app.window.match.commands import MATCH, PLATE_FILES
 from app.window.plugin_bar import trouble_commands
-from app.window.pose_look import POSE_LOOK
+from app.window.pose.look import POSE_LOOK
 from app.window.scene_commands import SCENE
+from app.window.timeline.curve_commands import CURVES
 from app.window.tool_commands import ACTION_COMMANDS, HAND, tool_commands
 from app.window.view_commands import FRAME, VIEW
 from app.window.window_commands import WINDOW

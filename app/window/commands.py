@@ -13,7 +13,7 @@ from core.errors import UserError
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
-    from app.window.match_view import PlateView
+    from app.window.match.view import PlateView
     from app.window.settings import Settings
 
 # what a command changes; only changes of the document are undo steps

@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from app.window.jobs import Jobs
-from app.window.keys_at_hand import KeysAtHand
+from app.window.timeline.keys_at_hand import KeysAtHand
 from core.document import Document, MeshObject
 from core.errors import UserError
 from core.groom.groom import Groom

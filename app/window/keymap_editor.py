@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 )
 
 from app.window import keymap as keymaps
-from app.window.combo import Combo
 from app.window.commands import Commands, Scope
+from app.window.fields.combo import Combo
+from app.window.files.opening import choose_file
 from app.window.keymap import Keymap, normal, shown
-from app.window.opening import choose_file
 from app.window.settings import write_whole
 from core.errors import UserError
 

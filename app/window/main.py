@@ -26,35 +26,35 @@ from app.window.commands import Commands
 from app.window.console import Console
 from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
 from app.window.crash import CrashBar, CrashWatch
-from app.window.curve_panel import CurvePanel
 from app.window.desk import Desk
-from app.window.doors import Doors
-from app.window.file_actions import FileActions
+from app.window.files.doors import Doors
+from app.window.files.file_actions import FileActions
+from app.window.files.opening import Opening
+from app.window.files.playblast import PlayblastDialog
+from app.window.files.recovery_bar import RecoveryBar
 from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
-from app.window.match_list import TrackList
-from app.window.match_view import PlateView
+from app.window.match.track_list import TrackList
+from app.window.match.view import PlateView
 from app.window.memory import give_back_freed_memory
-from app.window.opening import Opening
 from app.window.outliner import Outliner
 from app.window.palette import Palette
 from app.window.pictures_dialog import PicturesDialog
-from app.window.playblast import PlayblastDialog
 from app.window.plugin_bar import PluginBar
-from app.window.pose_controls import PoseControls
-from app.window.pose_list import PoseLibrary, PoseList
-from app.window.pose_side import BesideView, PoseSide
+from app.window.pose.controls import PoseControls
+from app.window.pose.poses import PoseLibrary, PoseList
+from app.window.pose.side import BesideView, PoseSide
 from app.window.preferences import Preferences
-from app.window.recovery_bar import RecoveryBar
 from app.window.screenshot import Photographer
 from app.window.sections import Column, FoldMemory, Section
 from app.window.settings import Settings, save_settings
 from app.window.shelf import Shelf
 from app.window.status_line import StatusLine
 from app.window.theme import apply, load_theme, look_of
-from app.window.timeline import Timeline
+from app.window.timeline.curve_panel import CurvePanel
+from app.window.timeline.timeline import Timeline
 from app.window.top_bar import TopBar
 from app.window.view_host import ViewHost
 from app.window.viewport_widget import Viewport

@@ -17,10 +17,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.window.combo import Combo
 from app.window.desk import Desk
+from app.window.fields.combo import Combo
+from app.window.files.opening import PICTURE_SUFFIXES, choose_file, filter_of
 from app.window.icons import paint_icon
-from app.window.opening import PICTURE_SUFFIXES, choose_file, filter_of
 from app.window.sections import Row
 from app.window.theme import look_of, text_font
 from app.window.uv_view import UvView

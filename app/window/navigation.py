@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from app.deliver import turned_view
 from app.window.desk import Desk
 from app.window.keymap import Navigation
-from app.window.match_eye import PlateEye
+from app.window.match.eye import PlateEye
 from core import navigate
 from core.camera import Camera, frame_points, ray_through
 from core.mesh.bvh import cast_rays

@@ -10,13 +10,13 @@ import msgspec
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.window.bars_together import BarsTogether
-from app.window.choice_bar import ChoiceBar, SwitchBar, TextField
-from app.window.color_field import ColorField
-from app.window.field_widget import FieldWidget
-from app.window.number_bar import NumberBar
+from app.window.fields.bars_together import BarsTogether
+from app.window.fields.choice_bar import ChoiceBar, SwitchBar, TextField
+from app.window.fields.color_field import ColorField
+from app.window.fields.field_widget import FieldWidget
+from app.window.fields.number_bar import NumberBar
+from app.window.fields.value_field import ValueField
 from app.window.sections import Row
-from app.window.value_field import ValueField
 from core.field import Field, fields_of
 from core.record import Record
 from core.value import Value

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.window.opening import choose_file
+from app.window.files.opening import choose_file
 from app.window.params_panel import make_field
 from app.window.sections import Row
 from app.window.settings import Settings

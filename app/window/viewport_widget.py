@@ -38,10 +38,10 @@ from app.window.desk import Desk
 from app.window.gestures import BrushDrag, Gestures
 from app.window.hotkeys import Hotkeys
 from app.window.live_picture import LivePicture, Stopwatch
-from app.window.match_view import PlateView
+from app.window.match.view import PlateView
 from app.window.navigation import CameraDrag, Eye
-from app.window.pose_overlay import skeleton_of
-from app.window.pose_views import PoseViews
+from app.window.pose.overlay import skeleton_of
+from app.window.pose.views import PoseViews
 from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
 from app.window.theme import look_of, text_font
 from core.document import Document

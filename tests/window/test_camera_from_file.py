@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QFileDialog, QMenu
 
-from app.window.playblast import PlayblastDialog
+from app.window.files.playblast import PlayblastDialog
 from core.camera import project
 from core.gate import gate_box
 from tests.window.hand import Hand

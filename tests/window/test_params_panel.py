@@ -12,16 +12,16 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.window.choice_bar import ChoiceBar, SwitchBar
-from app.window.color_field import ColorField
 from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
 from app.window.desk import Desk
-from app.window.number_bar import NumberBar
+from app.window.fields.choice_bar import ChoiceBar, SwitchBar
+from app.window.fields.color_field import ColorField
+from app.window.fields.number_bar import NumberBar
+from app.window.fields.value_field import ValueField
 from app.window.params_panel import MapBar, RecordForm, Setting, make_field
 from app.window.sections import Column, FoldMemory, Section
 from app.window.shelf import Shelf
 from app.window.theme import apply, load_theme
-from app.window.value_field import ValueField
 from core.curve import Curve, Key
 from core.field import Field, field, fields_of
 from core.groom.groom import COAT_FIELDS, Coat

@@ -10,8 +10,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit, QTabWidget
 from pytestqt.qtbot import QtBot
 
-from app.window.choice_bar import ChoiceBar, SwitchBar
-from app.window.number_bar import NumberBar
+from app.window.fields.choice_bar import ChoiceBar, SwitchBar
+from app.window.fields.number_bar import NumberBar
 from app.window.preferences import Preferences, PressureCurve
 from app.window.settings import Settings, load_settings, save_settings
 from core.errors import UserError

@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.window.combo import Combo
+from app.window.fields.combo import Combo
 from app.window.icons import icon, icon_names, icon_pixmap
 from app.window.theme import THEMES, Look, Theme, apply, load_theme, look_of
 

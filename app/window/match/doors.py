@@ -1,0 +1,105 @@
+"""Plates and tracks into the window and out of it: chosen, dropped, read in jobs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
+
+from app.window.desk import Desk
+from app.window.files.opening import choose_file, filter_of
+from core.errors import UserError
+from core.formats.atomic import atomic_write
+from core.formats.frame_decoder import FrameDecoder
+from core.formats.plate_file import MOVIES, PICTURES, read_plate
+from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
+from core.formats.tracks_json import Tracks
+from core.image.plate import Plate
+from core.image.plate_view import plate_size
+from tools.match_edits import add_plate, add_tracks, shown_plate
+
+NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
+
+
+class MatchDoors(QObject):
+    """Opens plates, reads and writes tracks. parent : of the file dialogs."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk)
+        self._desk, self._parent = desk, parent
+
+    def ask_plate(self) -> None:
+        """Let the artist choose a frame of a plate, or a movie."""
+        kinds = [filter_of("Plates: a frame of a sequence, or a movie", (*PICTURES, *MOVIES)), "All files (*)"]
+        choose_file(self._parent, "Open a plate", kinds, self.open_plate)
+
+    def open_plate(self, path: Path) -> None:
+        """Look at a plate in a job and put it in view, in the craft of matchmoving."""
+
+        def work() -> Plate:
+            decoder = FrameDecoder()
+            try:
+                return read_plate(path.absolute(), decoder)
+            finally:
+                decoder.close()
+
+        def done(plate: Plate) -> None:
+            if not self._desk.edit("Open plate", add_plate, plate):
+                return
+            self._desk.set_workspace(frame=float(self._desk.document.first_frame))
+            self._desk.set_craft("match")
+            if plate.missing:
+                self._desk.said.emit(f"{plate.name} misses {len(plate.missing)} of its frames; tracks go on over them.")
+
+        self._desk.jobs.start(f"Look at {path.name}", lambda progress, cancelled: work(), done)
+
+    def ask_import(self) -> None:
+        """Let the artist choose a file of tracks."""
+        self._plate()
+        kinds = [filter_of("Tracks", tuple(s for s in SUFFIXES if s != ".py")), "All files (*)"]
+        choose_file(self._parent, "Import tracks", kinds, self.import_tracks)
+
+    def import_tracks(self, path: Path) -> None:
+        """Add the tracks of a file to the plate in view."""
+        plate = self._plate()
+        size = plate_size(plate)
+
+        def done(found: Tracks) -> None:
+            if found.size is not None and tuple(found.size) != size:
+                self._desk.error(UserError(
+                    f"{path.name} is of a plate of {found.size[0]} x {found.size[1]} pixels, "
+                    f"{plate.name} has {size[0]} x {size[1]}."))
+            elif self._desk.edit("Import tracks", add_tracks, found.tracks, plate.id):
+                self._desk.said.emit(f"{len(found.tracks)} tracks of {path.name} were added.")
+
+        self._desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: read_tracks(path, size=size), done)
+
+    def ask_export(self) -> None:
+        """Let the artist name a file for the tracks; its suffix says for which program."""
+        plate = self._plate()
+        if not any(t.plate_id == plate.id for t in self._desk.document.tracks):
+            raise UserError("This plate has no tracks yet: place some first.")
+        choose_file(self._parent, "Export tracks", [filter_of("Tracks", SUFFIXES)], self.export_tracks, save=".json")
+
+    def export_tracks(self, path: Path) -> None:
+        """Write the tracks of the plate in view; hidden ones are left out."""
+        plate = self._plate()
+        tracks = tuple(t for t in self._desk.document.tracks if t.plate_id == plate.id and not t.hidden)
+        if path.suffix.lower() not in SUFFIXES:
+            raise UserError(f"{path.name}: tracks are written as {', '.join(SUFFIXES)}; choose one of these suffixes.")
+        written = Tracks(tracks, plate_size(plate), (plate.first, plate.last))
+
+        def work() -> None:
+            with atomic_write(path) as beside:
+                write_tracks(beside, written, path.suffix)
+
+        self._desk.jobs.start(
+            f"Write {path.name}", lambda progress, cancelled: work(),
+            lambda nothing: self._desk.said.emit(f"{len(tracks)} tracks were written to {path.name}."))
+
+    def _plate(self) -> Plate:
+        plate = shown_plate(self._desk.document)
+        if plate is None:
+            raise UserError(NO_PLATE)
+        return plate

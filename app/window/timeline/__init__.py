@@ -1,0 +1,1 @@
+"""Time: the ruler, playing, and the curves of keyed values."""

@@ -1,0 +1,178 @@
+"""A matchmover at the real window: a plate is opened, a point placed and followed, saved and opened again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.window.commands import Command
+from app.window.match.commands import MATCH
+from core.document import Document
+from core.image.plate import Plate
+from core.image.plate_view import view_points
+from core.match.outline import Mask
+from core.match.track import carried_points, keyed_track
+from core.record import freeze
+from tests.window.conftest import Opened
+from tests.window.hand import LEFT, NONE, Hand
+from tests.window.host import Host
+from tools import match_edits as edits
+
+WIDTH, HEIGHT, FIRST, COUNT = 240, 160, 1001, 10
+STEP = np.array([2.3, -0.7])  # pixels from frame to frame
+START = np.array([90.0, 90.0])
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Smooth noise that slides by STEP."""
+    folder = tmp_path_factory.mktemp("plate") / "sliding"
+    folder.mkdir()
+    rough = np.random.default_rng(7).random((100, 140, 3)).astype(np.float32)
+    noise = cv2.resize(rough, (560, 400), interpolation=cv2.INTER_CUBIC)
+    for n in range(COUNT):
+        x, y = np.meshgrid(np.arange(WIDTH) + 100 - n * STEP[0], np.arange(HEIGHT) + 100 - n * STEP[1])
+        frame = cv2.remap(noise, x.astype(np.float32), y.astype(np.float32), cv2.INTER_CUBIC)
+        cv2.imwrite(str(folder / f"sliding.{FIRST + n}.png"), np.clip(frame * 255.0, 0, 255).astype(np.uint8))
+    return folder
+
+
+def pixel(hand: Hand, place: NDArray[np.float64]) -> QPoint:
+    """The pixel of Qt's that shows a place of the plate."""
+    view = hand.view
+    x, y = view_points(view.eye.camera, 1.0, place, *view.pixels())[0]
+    ratio = view.devicePixelRatio()
+    return QPoint(round(x / ratio), round(y / ratio))
+
+
+def click(hand: Hand, place: NDArray[np.float64], modifiers: Qt.KeyboardModifier = NONE) -> None:
+    at = pixel(hand, place)
+    QTest.mousePress(hand.view, LEFT, modifiers, at)
+    QTest.mouseRelease(hand.view, LEFT, modifiers, at)
+    hand.painted()
+
+
+def opened_plate(opened: Opened, plate: Path) -> Hand:
+    hand = opened(Document())
+    hand.window.opening.open(plate)
+    hand.until(lambda: bool(hand.window.desk.document.plates))
+    hand.rest()
+    return hand
+
+
+def test_a_point_is_placed_followed_saved_and_opened_again(opened: Opened, plate: Path, tmp_path: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk = hand.window.desk
+    assert desk.session.tool.name == "track_point"
+    assert (desk.document.first_frame, desk.document.last_frame) == (FIRST, FIRST + COUNT - 1)
+    click(hand, START)
+    (track,) = desk.document.tracks
+    assert np.abs(track.points[0] - START).max() < 1.0 / hand.window.match.eye.camera.height * HEIGHT
+    assert desk.document.track_selection == (track.id,)
+    hand.window.commands.run("match.forward")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    (track,) = desk.document.tracks
+    assert list(track.frames) == list(range(FIRST, FIRST + COUNT))
+    truth = track.points[0] + STEP * np.arange(COUNT)[:, None]
+    assert np.abs(track.points - truth).max() < 0.1
+    assert desk.session.history.undo_name == "Track forward"
+    desk.set_workspace(frame=float(FIRST + 5))
+    hand.rest()
+    project = tmp_path / "shot.filo"
+    desk.session.save(project)
+    hand.window.opening.open(project)
+    hand.until(lambda: desk.session.path == project)
+    hand.rest()
+    assert np.array_equal(desk.document.tracks[0].points, track.points)
+    assert hand.window.match.shown
+
+
+EDITS = [c for c in MATCH if c.undo is not None and not c.twin.startswith("core.match")]
+BEFORE = {"match.show_all": "match.hide", "match.select_all": "match.select_none"}
+
+
+@pytest.mark.parametrize("command", EDITS, ids=lambda c: c.name)
+def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Host) -> None:
+    rows = np.column_stack((np.arange(11.0, 21.0), np.random.default_rng(1).random((10, 2)) * 9.0 + 50.0))
+    tracks = tuple(keyed_track(n, f"t{n}", rows + np.array([0.0, n, n]), 1) for n in (1, 2))
+    film = Plate(id=1, name="p", path="nothing.####.png", first=11, last=20, width=200, height=100)
+    document = edits.put_tracks(edits.add_plate(host.desk.document, film), tracks)
+    shape = freeze(np.array([[[5.0, 5.0], [50.0, 5.0], [5.0, 50.0]]]))
+    mask = Mask(id=1, name="m", frames=freeze(np.array([11], np.int32)), points=shape, plate_id=1)
+    document = document.replace(masks=(mask,))
+    host.desk.session.commit("Tracks", edits.select_tracks(document, (1, 2)))
+    host.desk.set_workspace(frame=15.0)
+    if command.name in BEFORE:
+        assert host.commands.run(BEFORE[command.name]), host.failed
+    before = host.desk.document
+    assert host.commands.run(command.name), host.failed
+    assert host.desk.document is not before
+    assert host.desk.session.history.undo_name == command.undo
+    host.commands.run("edit.undo")
+    assert host.desk.document is before
+
+
+def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    view, eye, desk = hand.view, hand.window.match.eye, hand.window.desk
+    for notches, corner in ((0, (0.5, 0.5)), (8, (0.4, 0.6)), (12, (0.55, 0.35)), (-14, (0.5, 0.5))):
+        width, height = view.pixels()
+        pixel_there = (corner[0] * width, corner[1] * height)
+        before = eye.under(*pixel_there)
+        view.eye.wheel("dolly", notches, *pixel_there)
+        assert np.allclose(eye.under(*pixel_there), before, atol=1e-6), "what is under the pointer stays there"
+        place = np.array([120.0, 80.0]) + 3.0 * notches
+        eye.look_at(place)
+        hand.painted()
+        click(hand, place)
+        made = desk.document.tracks[-1]
+        half_a_pixel = 0.5 * eye.camera.height / height * view.devicePixelRatio() + 1e-9
+        assert np.abs(made.points[0] - place).max() <= 1.01 * half_a_pixel
+        # the picture itself is where picking says: the colour under the click is that of the frame
+        shown = hand.window.match.screen.pixels(desk.document.plates[0], eye.frame)
+        assert shown is not None
+        if notches > 0:
+            hand.window.commands.run("match.hide")
+            view._pointer = None
+            view.redraw()
+            hand.painted()
+            image = view.grabFramebuffer()
+            color = image.pixelColor(pixel(hand, np.round(place)))
+            truth = shown[round(place[1]), round(place[0])]
+            assert np.abs(np.array([color.red(), color.green(), color.blue()]) - truth).max() <= 2
+    assert len(desk.document.tracks) == 4
+
+
+def test_cancelled_tracking_leaves_all_as_it_was_and_a_plane_is_pinned(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk = hand.window.desk
+    click(hand, START)
+    before = desk.document
+    hand.window.commands.run("match.forward")
+    (job,) = [j for j in desk.jobs.running if j.name == "Track forward"]
+    desk.jobs.cancel(job)
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    assert desk.document is before
+    assert hand.window.match.tracking.tails() == []
+    desk.choose("track_plane")
+    press, release = pixel(hand, np.array([60.0, 50.0])), pixel(hand, np.array([110.0, 100.0]))
+    QTest.mousePress(hand.view, LEFT, NONE, press)
+    QTest.mouseMove(hand.view, release)
+    hand.painted()
+    QTest.mouseRelease(hand.view, LEFT, NONE, release)
+    hand.painted()
+    (plane,) = desk.document.planes
+    assert np.abs(plane.corners[[0, 2]] - [[60.0, 50.0], [110.0, 100.0]]).max() < 1.0
+    hand.window.commands.run("match.planes")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    (plane,) = desk.document.planes
+    assert list(plane.frames) == list(range(FIRST, FIRST + COUNT))
+    pinned = carried_points(plane, FIRST + COUNT - 1, plane.corners)
+    assert pinned is not None
+    assert np.abs(pinned - plane.corners - STEP * (COUNT - 1)).max() < 0.2

@@ -1,0 +1,369 @@
+"""The craft of posing in the real window: rigs open in it, sliders and the map pose them, lists follow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from app.window.pose import map_panel as pose_map_panel
+from app.window.pose.controls import PoseControls
+from app.window.pose.overlay import skeleton_of
+from app.window.pose.poses import PoseLibrary, PoseList
+from core.demo.pose_document import pose_document
+from core.document import Document
+from core.overlay import Circle
+from core.pose.compare import LABELS
+from core.pose.edit_layers import cross_talk
+from core.pose.pose import REST
+from core.pose.rotation import quaternion_from_euler
+from core.pose.synthesis import evaluate
+from core.posed import shown_points
+from tests.window.conftest import Opened
+from tests.window.hand import Hand
+from tools.pose_edits import hold_pose
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture(scope="module")
+def rigs() -> Document:
+    return pose_document()
+
+
+@pytest.fixture
+def posing(opened: Opened, rigs: Document) -> Hand:
+    """A hand at a window with the arm and the face, in the craft of posing."""
+    hand = opened(rigs)
+    hand.window.resize(1500, 900)
+    hand.window.desk.set_craft("pose")
+    hand.rest()
+    return hand
+
+
+def part(hand: Hand, kind: type[QWidget]) -> QWidget:
+    return hand.window.findChild(kind)
+
+
+def test_crafts_are_words_at_the_top_with_their_own_tools_and_panels(opened: Opened, rigs: Document) -> None:
+    window = opened(rigs).window
+    QTest.mouseClick(window.top.crafts.buttons["pose"], LEFT)
+    assert window.desk.workspace.craft == "pose"
+    assert window.panels["controls"].isVisible()
+    assert window.pose_side.isVisible()
+    assert not window.panels["coat"].isVisible()
+    assert "grab" in window.shelf.buttons
+    QTest.mouseClick(window.top.crafts.buttons["groom"], LEFT)
+    assert not window.pose_side.isVisible()
+    assert window.panels["coat"].isVisible()
+    assert next(iter(window.shelf.buttons)) == window.desk.session.tools.of("groom")[0].name
+
+
+def test_a_slider_turns_the_joint_and_is_one_step(posing: Hand) -> None:
+    desk, controls = posing.window.desk, part(posing, PoseControls)
+    assert controls.joint.value() == "elbow"
+    for value, final in ((0.5, False), (1.2, False), (1.2, True)):
+        controls.angles[2].set_value(value)
+        controls.angles[2].edited.emit(value, final)
+    assert list(desk.session.history.names)[1:] == ["Pose"]
+    assert desk.document.meshes[0].pose.rotations["elbow"] == pytest.approx(
+        quaternion_from_euler((0, 0, math.degrees(1.2))), abs=1e-9)
+    QTest.mouseClick(controls.play, LEFT)
+    assert desk.document.meshes[0].pose is None
+
+
+def test_the_dot_of_the_map_takes_the_model_along(posing: Hand) -> None:
+    desk, canvas = posing.window.desk, posing.window.pose_side.map.canvas
+    desk.set_workspace(mesh=2)
+    posing.rest()
+    assert [s.name for s in canvas.chart.space.samples] == ["joy", "anger", "sadness", "calm"]
+    start, end = canvas.to_pixel(canvas.dot).toPoint(), canvas.to_pixel(np.array([0.5, 0.25])).toPoint()
+    before = shown_points(desk.document.meshes[1], 1001.0, desk.session.evaluator)
+    QTest.mousePress(canvas, LEFT, pos=start + QPoint(9, 0))
+    QTest.mouseMove(canvas, (start + end) / 2)
+    QTest.mouseMove(canvas, end)
+    assert desk.session.history.names == ("New",)  # a preview
+    QTest.mouseRelease(canvas, LEFT, pos=end)
+    pose = desk.document.meshes[1].pose
+    axes = [axis.dof.control for axis in canvas.chart.axes]
+    assert [pose.numbers[name] for name in axes] == pytest.approx(
+        canvas.to_place(QPointF(end)), abs=1e-9)
+    assert [pose.numbers[name] for name in axes] == pytest.approx([0.5, 0.25], abs=0.02)
+    after = shown_points(desk.document.meshes[1], 1001.0, desk.session.evaluator)
+    assert np.abs(after - before).max() > 1e-3
+
+
+def test_a_click_on_a_pose_of_the_map_holds_it(posing: Hand) -> None:
+    desk, canvas = posing.window.desk, posing.window.pose_side.map.canvas
+    where = canvas.to_pixel(canvas.chart.spots[1]).toPoint()
+    QTest.mouseClick(canvas, LEFT, pos=where)
+    sample = canvas.chart.space.samples[0]
+    assert desk.document.meshes[0].pose.rotations == sample.pose.rotations
+    assert canvas.chosen == 1
+
+
+def test_the_map_of_all_poses_mixes_those_near_the_dot(posing: Hand) -> None:
+    desk, side = posing.window.desk, posing.window.pose_side
+    desk.set_workspace(mesh=2)
+    side.map.across.enter("all poses (by distance)")
+    chart = side.map.canvas.chart
+    assert chart.axes is None
+    joy = [s.name for s in chart.space.samples].index("joy")
+    assert side.map.pose_of(tuple(chart.spots[1 + joy])).numbers == pytest.approx(
+        chart.space.samples[joy].pose.numbers)
+
+
+def test_the_heat_of_the_map_is_painted_by_a_job(posing: Hand) -> None:
+    posing.rest()
+    values = posing.window.pose_side.map.canvas._heat[0]
+    assert values.max() == pytest.approx(1.0, abs=0.05)
+    assert abs(values[len(values) // 2].min()) < 0.3
+
+
+def test_the_list_has_the_layers_and_holds_a_pose(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    top = [poses.list.topLevelItem(i) for i in range(poses.list.topLevelItemCount())]
+    assert [item.child(0).text(0) for item in top] == ["elbow bent", "shoulder raised", "forearm twisted"]
+    poses.list.setCurrentItem(top[2].child(0))
+    poses.list.itemClicked.emit(top[2].child(0), 0)
+    assert list(desk.document.meshes[0].pose.rotations) == ["wrist"]
+    assert poses.falloffs["wrist"].value() > 0.0
+    poses.falloffs["wrist"].enter(0.5)
+    layer = desk.document.meshes[0].correctives.layers[2]
+    assert layer.space.samples[0].falloffs["wrist"] == (0.5,)
+    top = poses.list.topLevelItem(0)
+    top.setCheckState(0, Qt.CheckState.Unchecked)
+    posing.until(lambda: not desk.document.meshes[0].correctives.layers[0].enabled)
+    assert list(desk.session.history.names)[1:] == ["Pose", "Falloff", "Hide layer"]
+
+
+def test_methods_are_compared_by_a_switch(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    poses.way.enter("linear")
+    assert {layer.kind for layer in desk.document.meshes[0].correctives.layers} == {"linear"}
+    assert desk.session.history.undo_name == "Method"
+
+
+def test_a_sculpt_at_a_taken_pose_is_refused_in_words(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    said: list[str] = []
+    desk.failed.connect(lambda words, details: said.append(words))
+    desk.edit("Pose", lambda document, i: document.replace(meshes=(
+        document.meshes[0].replace(pose=REST), *document.meshes[1:])), 1)
+    QTest.mouseClick(poses.buttons["add"], LEFT)
+    assert said
+    assert "rest" in said[0]
+    bent = desk.posed.correctives.layers[0].space.samples[0].pose
+    half = {"elbow": tuple(map(float, quaternion_from_euler((0.0, 0.0, 40.0))))}
+    desk.edit("Pose", hold_pose, 1, bent.replace(name="half", rotations=half))
+    QTest.mouseClick(poses.buttons["add"], LEFT)
+    name = desk.posed.correctives.layers[0].space.samples[1].name
+    desk.edit("Pose", hold_pose, 1, bent.replace(name="again"))
+    poses.list.clearSelection()
+    poses.list.topLevelItem(0).child(1).setSelected(True)
+    assert poses.chosen == [name]
+    QTest.mouseClick(poses.buttons["move"], LEFT)
+    assert bent.name in said[1]
+    assert set(poses.chosen) == {bent.name, name}, "those that the refusal names, to be merged or deleted"
+    assert poses.buttons["merge"].isEnabled()
+
+
+def test_poses_are_kept_in_the_library_and_held_again(posing: Hand) -> None:
+    desk, library, controls = posing.window.desk, part(posing, PoseLibrary), part(posing, PoseControls)
+    controls.angles[0].edited.emit(0.0, True)
+    library.keep("first try")
+    QTest.mouseClick(controls.rest, LEFT)
+    assert [pose.name for pose in desk.document.meshes[0].library] == ["first try"]
+    library.list.itemClicked.emit(library.list.topLevelItem(0), 0)
+    assert desk.document.meshes[0].pose.name == "first try"
+    library.list.topLevelItem(0).setSelected(True)
+    QTest.mouseClick(library.forget_button, LEFT)
+    assert desk.document.meshes[0].library == ()
+
+
+def test_map_and_model_stand_over_one_another_in_a_narrow_window(posing: Hand) -> None:
+    window = posing.window
+    assert window.sides.orientation() == Qt.Orientation.Horizontal
+    window.resize(900, 700)
+    posing.rest()
+    assert window.sides.orientation() == Qt.Orientation.Vertical
+    assert window.viewport.width() > 300
+
+
+def colours_of_the_surface_follow_the_pose_and_say_what_they_mean(posing: Hand) -> None:
+    window = posing.window
+    desk, picture = window.desk, window.viewport.picture
+    window.pose_side.look.heat.enter("shape")
+    assert desk.workspace.view.heat == "shape"
+    at_rest = picture_values(posing)
+    assert np.ptp(at_rest) == pytest.approx(0.0, abs=1e-6)
+    desk.edit("Pose", hold_pose, desk.posed.id, desk.posed.correctives.layers[0].space.samples[0].pose)
+    drawn(posing)
+    assert np.ptp(picture_values(posing)) > 0.2
+    legend = picture.panes.shown[0].legend
+    assert legend.signed
+    assert legend.ticks[2].endswith("m")
+    window.commands.run("view.heat_error")
+    drawn(posing)
+    assert picture.panes.shown[0].legend.title.startswith("Error")
+    window.commands.run("view.heat_plain")
+    drawn(posing)
+    assert picture.panes.shown[0].scene.surfaces[0].values is None
+    desk.choose("mask")
+    drawn(posing)
+    assert picture.panes.shown[0].legend.title == "Mask"
+
+
+def methods_stand_side_by_side_and_the_hand_works_in_any_of_them(posing: Hand) -> None:
+    window = posing.window
+    desk, view = window.desk, window.viewport
+    whole = view.pixels()
+    desk.edit("Pose", hold_pose, desk.posed.id, desk.posed.correctives.layers[0].space.samples[0].pose)
+    window.pose_side.look.sides.enter("SSD · SI · PSD · WPSD")
+    drawn(posing)
+    panes = view.picture.panes.shown
+    assert [pane.name for pane in panes] == [LABELS[m] for m in ("skin", "interpolation", "pose-space", "weighted")]
+    skin, _, psd, _ = (pane.scene.surfaces[0].points for pane in panes)
+    item = desk.posed
+    assert np.array_equal(skin, evaluate(item.mesh.points, item.rig, None, item.pose))
+    assert psd == pytest.approx(evaluate(item.mesh.points, item.rig, item.correctives, item.pose), abs=1e-6)
+    size = view.pixels()
+    assert size == (whole[0] // 2, whole[1] // 2)
+    desk.choose("rotate")
+    names = item.rig.skeleton.names
+    rings = [m for m in skeleton_of(desk, view.eye.camera, size, 1.0) if isinstance(m, Circle)]
+    ring = rings[names.index("elbow")]
+    place = (ring.x + size[0] + 0.5) / whole[0], (ring.y + size[1] + 0.5) / whole[1]  # in the last pane
+    posing.press(place)
+    posing.release(place)
+    drawn(posing)
+    assert desk.posed.joint_selection == ("elbow",)
+    window.commands.run("view.single")
+    drawn(posing)
+    assert view.pixels() == whole
+
+
+def two_dials_have_a_pad_whose_dots_are_the_sculpts(posing: Hand) -> None:
+    window = posing.window
+    desk, controls = window.desk, part(posing, PoseControls)
+    assert controls.pad is None
+    desk.set_workspace(mesh=desk.document.meshes[1].id)
+    pad = controls.pad
+    joy = next(pose for pose in pad.poses if pose.name == "joy")
+    assert {pose.name for pose in pad.poses} == {"joy", "anger", "sadness", "calm"}
+    steps = len(desk.session.history.names)
+    start, end = pad.to_pixel(*pad.at).toPoint(), pad.to_pixel(0.5, -0.25).toPoint()
+    QTest.mousePress(pad, LEFT, pos=start)
+    QTest.mouseMove(pad, (start + end) / 2)
+    QTest.mouseMove(pad, end)
+    held = desk.posed.pose.numbers
+    assert held["valence"] == pytest.approx(0.5, abs=0.02)
+    assert held["arousal"] == pytest.approx(-0.25, abs=0.02)
+    QTest.mouseRelease(pad, LEFT, pos=end)
+    assert len(desk.session.history.names) == steps + 1
+    assert controls.dials["valence"].value() == pytest.approx(held["valence"])
+    QTest.mouseClick(pad, LEFT, pos=pad.to_pixel(joy.numbers["valence"], joy.numbers["arousal"]).toPoint())
+    assert desk.posed.pose.numbers == joy.numbers
+
+
+def a_chosen_layer_shows_what_it_is_set_to_and_takes_another_kernel(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    poses.list.clearSelection()
+    poses.list.setCurrentItem(poses.list.topLevelItem(0))
+    name = poses.chosen_layer
+    assert {"kernel", "affine", "normalise", "clamp", "smoothing", "table", "weighted"} <= poses.settings.fields.keys()
+    poses.settings.fields["kernel"].enter("wendland")
+    layer = desk.posed.correctives.layers[0]
+    assert (layer.name, layer.space.kernel) == (name, "wendland")
+    assert poses.chosen_layer == name
+    poses.readings["elbow"].enter("swing")
+    assert [dof.kind for dof in desk.posed.correctives.layers[0].space.dofs] == ["swing"]
+    desk.session.undo()
+    desk.session.undo()
+    assert desk.posed.correctives.layers[0].space.kernel == "gaussian"
+
+
+def skin_only_is_looked_at_and_weighted_is_a_step(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    before = desk.posed.correctives
+    poses.way.enter("skin")
+    drawn(posing)
+    assert desk.posed.correctives is before
+    assert posing.window.viewport.picture.panes.shown[0].name == LABELS["skin"]
+    poses.way.enter("weighted")
+    drawn(posing)
+    assert all(layer.space.weighted for layer in desk.posed.correctives.layers)
+    assert desk.session.history.names[-1] == "Method"
+    assert posing.window.viewport.picture.panes.shown[0].name == ""
+    assert poses.way.value() == "weighted"
+
+
+def cross_talk_is_a_table_whose_rows_hold_their_poses(posing: Hand) -> None:
+    desk, side = posing.window.desk, posing.window.pose_side
+    side.kind.enter("talk")
+    drawn(posing)
+    item = desk.posed
+    names, known = cross_talk(item.mesh.points, item.rig, item.correctives)
+    assert side.talk.names == names
+    assert np.array_equal(side.talk.table, known)
+    QTest.mouseClick(side.talk, LEFT, pos=side.talk.cell(1, -1).center().toPoint())
+    held = desk.posed.pose
+    assert held.name == names[1]
+    side.talk.show_table(("bent", "raised"), np.array([[0.0, 0.0023], [0.0, 0.0]]))
+    assert "bent the sculpt raised moves the surface by 2.3 mm" in side.talk.said(0, 1)
+    assert "silent" in side.talk.said(1, 0)
+
+
+def respect_says_only_what_concerns_posing(posing: Hand) -> None:
+    panel = posing.window.panels["respect"]
+    shown = {name for name, row in panel.form.rows.items() if not row.isHidden()}
+    assert shown == {"symmetry"}
+    posing.window.desk.set_craft("groom")
+    assert {name for name, row in panel.form.rows.items() if not row.isHidden()} == {
+        "hairspray", "selection", "symmetry"}
+
+
+def a_map_of_many_sculpts_is_laid_out_by_a_job(hand: Hand) -> None:
+    canvas, bars = hand.window.pose_side.map.canvas, hand.window.pose_side.map
+    known = canvas.chart
+    bars.layer.enter("wrist")
+    bars.layer.enter("elbow")
+    assert canvas.chart is None
+    assert "Laying out" in canvas.words
+    drawn(hand)
+    assert np.array_equal(canvas.chart.spots, known.spots)
+    assert len(canvas.chart.rims) == len(known.rims)
+    assert canvas.dot is not None
+
+
+def test_what_the_view_shows_and_what_stands_beside_it(posing: Hand, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one window, for opening one takes longer than all of these."""
+    with monkeypatch.context() as patch:
+        patch.setattr(pose_map_panel, "AT_ONCE", 0)
+        a_map_of_many_sculpts_is_laid_out_by_a_job(posing)
+    for follows in (
+        colours_of_the_surface_follow_the_pose_and_say_what_they_mean,
+        methods_stand_side_by_side_and_the_hand_works_in_any_of_them,
+        a_chosen_layer_shows_what_it_is_set_to_and_takes_another_kernel,
+        skin_only_is_looked_at_and_weighted_is_a_step,
+        cross_talk_is_a_table_whose_rows_hold_their_poses,
+        two_dials_have_a_pad_whose_dots_are_the_sculpts,
+        respect_says_only_what_concerns_posing,
+    ):
+        follows(posing)
+
+
+def picture_values(hand: Hand) -> np.ndarray:
+    drawn(hand)
+    values = hand.window.viewport.picture.panes.shown[0].scene.surfaces[0].values
+    assert values is not None
+    return values
+
+
+def drawn(hand: Hand) -> None:
+    """Wait until jobs have ended and what they caused is on the screen; nothing needs to be finished for that."""
+    hand.until(lambda: not hand.window.desk.jobs.running and not hand.view.pending)
