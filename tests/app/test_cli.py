@@ -11,13 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
-
-
-def filoplume(*arguments: object, cwd: Path = ROOT) -> subprocess.CompletedProcess:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "app", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=280, check=False)
+from tests.app.command_line import ROOT, filoplume, filoplume_process
 
 
 def write_ball(path: Path, rings: int = 24, segments: int = 32) -> Path:
@@ -51,7 +45,7 @@ def groomed(tmp_path_factory):
     ball = write_ball(folder / "ball.obj")
     outputs = [folder / f"coat.{suffix}" for suffix in ("filo", "usdc", "abc", "hair")]
     flags = [flag for path in outputs for flag in ("-o", path)]
-    done = filoplume("groom", ball, *flags, "--guides", 120, "--hairs", 2500, "--seed", 5, "--json")
+    done = filoplume_process("groom", ball, *flags, "--guides", 120, "--hairs", 2500, "--seed", 5, "--json")
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout), done
 
@@ -207,7 +201,7 @@ def test_a_script_has_the_same_calls_and_its_own_arguments(groomed, tmp_path):
         "session.save(sys.argv[2])\n"
         "print(len(groom.guides))\n"
     )
-    done = filoplume("run", script, folder / "coat.filo", tmp_path / "fewer.filo")
+    done = filoplume_process("run", script, folder / "coat.filo", tmp_path / "fewer.filo")
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "120"
     assert json.loads(filoplume("info", tmp_path / "fewer.filo", "--json").stdout)["hairs"] == 10

@@ -13,7 +13,7 @@ from core.formats.project import read_project, write_project
 from core.formats.rig_file import read_rig
 from core.pose.pose import Pose, local_of_pose
 from core.pose.skinning import deformed
-from tests.app.test_cli import filoplume
+from tests.app.command_line import filoplume
 from tests.core.formats.posed_samples import posed_arm, turned
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.formats.flow_file import read_flo
-from tests.app import test_cli
+from tests.app import command_line
 from tests.core.match.plates import frame, place
 
 POINT = np.array([70.0, 62.0])
@@ -15,8 +15,7 @@ POINT = np.array([70.0, 62.0])
 
 def filoplume(*arguments):
     """Exit code, standard output and standard error."""
-    done = test_cli.filoplume(*arguments)
-    return done.returncode, done.stdout, done.stderr
+    return tuple(command_line.filoplume(*arguments))
 
 
 @pytest.fixture(scope="module")
