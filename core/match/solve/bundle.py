@@ -14,6 +14,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.spatial.transform import Rotation
 
 from core.match.solve.bundle_kernels import accumulate
+from core.match.solve.constraints import Pull
 from core.match.solve.state import (
     FRAME_COLUMNS,
     FRAME_FOCAL,
@@ -34,19 +35,21 @@ class Free(NamedTuple):
     """What may change: columns of every frame, columns of the lens, the points.
 
     zoom : (F, F) float64 quadratic cost on the frames' focal lengths (smoothness), or None.
+    pull : what is known of the points, or None.
     """
 
     frame: tuple[int, ...] = POSE
     lens: tuple[int, ...] = ()
     points: bool = True
     zoom: Array | None = None
+    pull: Pull | None = None
 
 
 RIGID = Free()
 
 
 class Normal(NamedTuple):
-    """Blocks of the normal equations, of all columns; see :func:`accumulate`."""
+    """Blocks of the normal equations, of all columns; see :func:`accumulate`. pulled : (3P, 3P) of constraints."""
 
     cost: float
     frames: Array
@@ -58,6 +61,7 @@ class Normal(NamedTuple):
     lens_right: Array
     frame_lens: Array
     point_lens: Array
+    pulled: Array | None = None
 
 
 class Adjusted(NamedTuple):
@@ -87,7 +91,12 @@ def normal_equations(state: State, observations: Observations, scale: float, fre
         pull = free.zoom @ state.focal
         cost += float(state.focal @ pull)
         right_of_frames[:, FRAME_FOCAL] -= pull
-    return Normal(cost, *blocks)
+    pulled = None
+    if free.pull is not None and free.points:
+        more, right, pulled = free.pull.normal(state.points)
+        cost += more
+        right_of_points += right
+    return Normal(cost, *blocks, pulled)
 
 
 def adjust(
@@ -184,6 +193,8 @@ def _points_kept(normal: Normal, observations: Observations, free: Free) -> _Sid
     at = len(lens) + np.arange(3 * points).reshape(points, 3)
     if points:
         matrix[at[:, :, None], at[:, None, :]] = normal.points
+        if normal.pulled is not None:
+            matrix[at[0, 0] : at[-1, -1] + 1, at[0, 0] : at[-1, -1] + 1] += normal.pulled
         right[at] = normal.points_right
         _cross(matrix, at, normal.point_lens[:, :, lens])
         coupling[observations.frame[:, None, None], np.arange(width)[:, None], at[observations.track][:, None, :]] = (
@@ -226,7 +237,7 @@ def reduced(
     """Eliminate one side, the larger one when it is not said which; None when a block is singular."""
     poses = len([column for column in free.frame if column != FRAME_FOCAL])
     if frames_out is None:
-        frames_out = not free.points or poses * len(normal.frames) > 3 * len(normal.points)
+        frames_out = not free.points or free.pull is not None or poses * len(normal.frames) > 3 * len(normal.points)
     sides = (_points_kept if frames_out else _poses_kept)(normal, observations, free)
     matrix, size, d = sides.matrix, len(sides.right), sides.blocks.shape[1]
     matrix[np.diag_indices(size)] += damping * (matrix.diagonal() + 1e-12)
