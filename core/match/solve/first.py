@@ -17,7 +17,7 @@ ENOUGH_PARALLAX = 0.12  # radians; more makes a pair no better
 PAIRS = 6
 TESTED = 5  # other keyframes a hypothesis is tried on
 FEWEST_POINTS = 5  # seen by a camera that is found from them
-BUNDLES = (2, 4, 8, 16)  # numbers of keyframes at which all is adjusted
+BUNDLES = (2, 4, 8, 16, 24, 36, 54, 81, 120, 180, 270)  # numbers of keyframes at which all is adjusted
 
 
 class Pair(NamedTuple):

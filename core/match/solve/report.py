@@ -83,9 +83,10 @@ def report(solution: Solution, names: list[str]) -> Report:
     state, part = solution.state, solution.observations.take(solution.used)
     whitened = residuals(state, part)
     length = np.linalg.norm(whitened, axis=1) / np.sqrt(part.root[:, 0] * part.root[:, 2])  # pixels again
+    length = length * solution.pixel[part.frame]
     by_frame = _rms(part.frame, length, len(solution.frames))
     by_track = _rms(part.track, length, len(solution.held))
-    focal = np.exp(state.lens[FOCAL] + state.focal)
+    focal = np.exp(state.lens[FOCAL] + state.focal) * solution.pixel
     seen = np.bincount(solution.observations.track, minlength=len(solution.held)) >= 2
     out = 1.0 - float(solution.held[seen].mean()) if seen.any() else 1.0
     noisy = solution.sigma / solution.noise

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from core.errors import UserError
-from core.match.solve.bundle import POSE, TURN, Free, adjust, smooth_zoom
+from core.match.solve.bundle import POSE, TURN, Free, adjust
 from core.match.solve.first import Cameras, Grower, best_pairs, keyframes, rays, triangulated
 from core.match.solve.floor import noise_floor
 from core.match.solve.nodal import solve_nodal
@@ -26,9 +27,10 @@ from core.match.solve.state import (
     residuals,
     start_lens,
 )
+from core.match.solve.views import Camera, Views, as_one, check, guessed, one_shot, ties
 from core.match.track import HAND, Track
 
-LEAST_TRACKS = 8
+LEAST_TRACKS, LEAST_PICKS = 8, 6  # of a shot; of photographs
 NODAL_SURE, NODAL_MAYBE = 1.3, 3.0  # median residual over the noise: a turning camera explains it; it may
 ACCEPT = 1.25  # of the noise: the keyframes are explained
 WORSE = 1.15  # of the noise: something of the lens may be missing
@@ -36,8 +38,10 @@ GAIN = 0.93  # of the median residual: a richer lens is worth its parameters
 MEDIAN = 1.1774  # median of the length of a normal vector in the plane
 FOCALS = (0.7, 1.0, 1.6, 2.8)  # of the width of the picture, where nobody knows
 OUTLIER = 4.5  # standard deviations
+PICKED = 1.0 / 2000.0  # of the width of a photograph: noise of what was seen in photographs alone
 WILD = 0.005  # of the width of the picture: noise no tracker makes
 HYPOTHESES = 6
+ROUNDS, REFOCUSED = 2, 0.002  # of a camera whose distortion was taken out at a focal length that moved by this part
 
 
 class Options(NamedTuple):
@@ -62,6 +66,8 @@ class Solution(NamedTuple):
     kind : "free" or "nodal". noise : standard deviation of an axis the tracks have by themselves, whitened.
     sigma : standard deviation of the whitened residuals of an axis. keys : rows of the keyframes.
     free : what was found; the rest was given. said : words for the artist.
+    pixel : (F,) pixels of its own picture that one of the solve is in each frame; 1 but for photographs and witnesses.
+    views : who took which frame. The observations are as the first camera would have them.
     """
 
     state: State
@@ -77,9 +83,8 @@ class Solution(NamedTuple):
     size: tuple[int, int]
     free: Free
     said: tuple[str, ...]
-
-
-
+    pixel: Array
+    views: Views
 
 
 def observations_of(tracks: Sequence[Track]) -> tuple[Observations, Rows]:
@@ -118,41 +123,90 @@ def observations_of(tracks: Sequence[Track]) -> tuple[Observations, Rows]:
 
 def solve(
     observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options = AS_GIVEN,
-    progress: Callable[[str], None] = lambda words: None,
+    progress: Callable[[str], None] = lambda words: None, views: Views | None = None,
 ) -> Solution:
     """Cameras and points from observations of `tracks` tracks in frames (F,) of `size` pixels.
+
+    views : who took which frame, where it is not one shot; its first camera is the one `size` and `options` tell of.
 
     Raises
     ------
     UserError
         There is no camera that explains the tracks, or it cannot be told; the message says why.
     """
-    _check(observations, frames, tracks)
-    pixels = noise_floor(observations, len(frames))
+    views = views or one_shot(len(frames), Camera(size))
+    views = views._replace(cameras=(
+        views.cameras[0]._replace(focal=options.focal, found=options.free_focal), *views.cameras[1:]))
+    check(views)
+    _check(observations, frames, tracks, alone=bool(views.alone.all()))
+    if options.focal is not None or options.nodal:
+        guesses = [options.focal or float(size[0])]
+    else:
+        guesses = [share * max(size) for share in FOCALS]
+    found = _best(observations, frames, tracks, size, options, progress, views, guesses)
+    for _ in range(ROUNDS):  # what bends the pictures of a camera is told over its focal length
+        better = _refocused(found)
+        if better is None:
+            break
+        found = _best(observations, frames, tracks, size, options, progress, better, guesses)
+    return found
+
+
+def _refocused(found: Solution) -> Views | None:
+    """Views with the focal lengths that were found, where one was and its distortion was taken out at another."""
+    cameras = list(found.views.cameras)
+    focal = np.exp(found.state.focal + found.state.lens[FOCAL]) * found.pixel
+    moved = False
+    for row, camera in enumerate(cameras):
+        of_it = found.known & (found.views.camera == row)
+        if row and of_it.any() and (camera.found or camera.focal is None) and (camera.k1 or camera.k2):
+            now = float(np.median(focal[of_it]))
+            moved = moved or abs(now / guessed(camera) - 1.0) > REFOCUSED
+            cameras[row] = camera._replace(focal=now, found=True)
+    return found.views._replace(cameras=tuple(cameras)) if moved else None
+
+
+def _best(
+    observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
+    progress: Callable[[str], None], views: Views, guesses: list[float],
+) -> Solution:
+    best: tuple[_Start, _Problem] | None = None
+    for focal in guesses:
+        problem = _Problem(observations, frames, tracks, size, options, views, focal, progress)
+        start = problem.begin()
+        if best is None or start.doubt < best[0].doubt:
+            best = start, problem
+    assert best is not None
+    return best[1].finish(best[0])
+
+
+def _noise(observations: Observations, views: Views, size: tuple[int, int]) -> tuple[float, bool]:
+    """Standard deviation of an axis in pixels, and whether the tracks told it: photographs alone do not."""
+    shot = np.flatnonzero(~views.alone)
+    if len(shot) < 3 and views.alone.any():
+        return PICKED * max(size), False
+    number = np.full(len(views.alone), -1, np.int32)
+    number[shot] = np.arange(len(shot))
+    part = observations.take(number[observations.frame] >= 0)
+    pixels = noise_floor(part._replace(frame=number[part.frame]), len(shot))
     if pixels > WILD * size[0]:
         raise UserError(
             f"The tracks jump about by {pixels:.0f} px from frame to frame as no camera moves points: they are not "
             "tracks of one rigid scene."
         )
-    unit = float(np.median(observations.root[:, 0]))
-    problem = _Problem(observations, frames, tracks, size, options, pixels * unit, pixels, progress)
-    if options.focal is not None or options.nodal:
-        guesses = [options.focal or float(size[0])]
-    else:
-        guesses = [share * size[0] for share in FOCALS]
-    best = min((problem.begin(focal) for focal in guesses), key=lambda start: start.doubt)
-    return problem.finish(best)
+    return pixels, True
 
 
-def _check(observations: Observations, frames: Rows, tracks: int) -> None:
+def _check(observations: Observations, frames: Rows, tracks: int, *, alone: bool) -> None:
     if len(frames) < 2:
         raise UserError("The tracks are on one frame only; a camera needs two frames at least, better twenty.")
     if not np.isfinite(observations.xy).all():
         raise UserError("The tracks hold places that are not numbers; track them again.")
     long = np.bincount(observations.track, minlength=tracks) >= 2
-    if long.sum() < LEAST_TRACKS:
+    least = LEAST_PICKS if alone else LEAST_TRACKS
+    if long.sum() < least:
         raise UserError(
-            f"{int(long.sum())} tracks are seen on two frames or more; a camera needs {LEAST_TRACKS} at least, better "
+            f"{int(long.sum())} tracks are seen on two frames or more; a camera needs {least} at least, better "
             "twenty, spread over the picture and over near and far."
         )
 
@@ -171,13 +225,31 @@ class _Start(NamedTuple):
 class _Problem:
     def __init__(
         self, observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
-        noise: float, pixels: float, progress: Callable[[str], None],
+        views: Views, focal: float, progress: Callable[[str], None],
     ) -> None:
-        self.observations, self.frames, self.tracks, self.size = observations, frames, tracks, size
-        self.options, self.noise, self.pixels, self.progress = options, noise, pixels, progress
-        self.keys = keyframes(observations, len(frames), tracks)
-        self.key_frames = frames[self.keys]
+        self.observations, self.pixel = as_one(observations, views, focal)
+        self.frames, self.tracks, self.size, self.views = frames, tracks, size, views
+        self.pixels, told = _noise(self.observations, views, size)
+        self.noise = self.pixels * float(np.median(self.observations.root[:, 0]))
+        self.least = self.noise if told else 0.2 * self.noise  # photographs may be seen better than usual
+        self.options, self.lens, self.progress = options, start_lens(focal, *size), progress
+        self.keys = self._keys()
         self.part = self._of_keyframes()
+
+    def _keys(self) -> list[int]:
+        """Rows of all photographs and of keyframes of the shot."""
+        alone = self.views.alone
+        if not alone.any():
+            return keyframes(self.observations, len(self.frames), self.tracks)
+        shot = np.flatnonzero(~alone)
+        number = np.full(len(alone), -1, np.int32)
+        number[shot] = np.arange(len(shot))
+        part = self.observations.take(number[self.observations.frame] >= 0)
+        keys = keyframes(part._replace(frame=number[part.frame]), len(shot), self.tracks) if len(shot) else []
+        return sorted([*(int(shot[k]) for k in keys), *(int(k) for k in np.flatnonzero(alone))])
+
+    def _tied(self, rows: NDArray, *, zoom: bool) -> Array | None:
+        return ties(self.views, rows, self.frames[rows], zoom=zoom)
 
     def _of_keyframes(self) -> Observations:
         number = np.full(len(self.frames), -1, np.int32)
@@ -192,11 +264,11 @@ class _Problem:
 
     # -- keyframes ----------------------------------------------------------------------------------------
 
-    def begin(self, focal: float) -> _Start:
-        """The best explanation of the keyframes that starts at a focal length."""
-        lens = start_lens(focal, *self.size)
+    def begin(self) -> _Start:
+        """The best explanation of the keyframes that starts at the focal length."""
+        lens = self.lens
         free = self.options.focal is None or self.options.free_focal
-        nodal = self._nodal(lens, free)
+        nodal = None if self.views.alone.any() else self._nodal(lens, free)
         if nodal is not None and (nodal.doubt < NODAL_SURE or self.options.nodal):
             return nodal
         found = self._free(lens, free)
@@ -210,13 +282,13 @@ class _Problem:
     def _nodal(self, lens: Array, free: bool) -> _Start | None:
         self.progress("does the camera only turn?")
         best: _Start | None = None
-        smooth = smooth_zoom(self.key_frames)
+        rows = np.asarray(self.keys)
         for columns, zoom in self._lenses(free):
             if best is not None and best.doubt < WORSE and not (self.options.zoom and zoom):
                 continue
             done = solve_nodal(
                 self.part, len(self.keys), self.tracks, lens, self.pixels, scale=2.5 * self.noise,
-                lens_columns=columns, zoom=smooth if zoom else None,
+                lens_columns=columns, zoom=self._tied(rows, zoom=zoom),
             )
             if done is None:
                 continue
@@ -228,7 +300,11 @@ class _Problem:
 
     def _lenses(self, free: bool) -> list[tuple[tuple[int, ...], bool]]:
         """What of the lens may be free, and whether it zooms: what was asked for, then richer ones."""
-        asked = ((FOCAL,) if free else ()) + ((K1,) if self.options.distortion else ())
+        bent: tuple[int, ...] = (K1,) if self.options.distortion else ()
+        if len(self.views.cameras) > 1:  # focal lengths are columns of the frames then
+            zoom, richer = self.options.zoom, (K1,)
+            return [(bent, zoom)] if bent else [(bent, zoom), (richer, zoom)]
+        asked = ((FOCAL,) if free else ()) + bent
         tries = [(asked, False), (tuple(sorted({FOCAL, *asked})), False)]
         tries.append((tuple(c for c in asked if c != FOCAL), True))
         tries.append((tuple(sorted({FOCAL, K1, *asked})), False))
@@ -275,8 +351,8 @@ class _Problem:
         for columns, zoom in self._lenses(free):
             if best is not None and best.doubt < WORSE and not (self.options.zoom and zoom):
                 continue
-            smooth = smooth_zoom(self.key_frames[cameras.known]) if zoom else None
-            other = grower.adjusted(cameras, columns, smooth) if columns or zoom else cameras
+            tied = self._tied(np.asarray(self.keys)[cameras.known], zoom=zoom)
+            other = grower.adjusted(cameras, columns, tied) if columns or tied is not None else cameras
             doubt = self._key_doubt(other)
             if best is None or doubt < GAIN * best.doubt or (self.options.zoom and zoom):
                 best = _Start(doubt, "free", other, columns, zoom, self._changed(other.state, columns, zoom, free))
@@ -296,18 +372,18 @@ class _Problem:
         nodal = start.kind == "nodal"
         state, known, held = self._between(start, nodal)
         observations, count = self.observations, len(self.frames)
-        zoom = smooth_zoom(self.frames) if start.zoom else None
+        zoom = self._tied(np.arange(count), zoom=start.zoom)
         columns = (TURN if nodal else POSE) + ((FRAME_FOCAL,) if zoom is not None else ())
         free = Free(frame=columns, lens=start.lens_columns, zoom=zoom)
         least = 1e-6 if nodal else 1e-12
         used = known[observations.frame] & held[observations.track]
         self.progress("adjusting all frames together")
-        spread = max(self.noise, self._spread(state, observations, used))
+        spread = max(self.least, self._spread(state, observations, used))
         state = adjust(
             state, observations.take(used), free, scale=2.5 * spread, tolerance=1e-4, least_damping=least, iterations=20
         ).state
         for _ in range(2):
-            spread = max(self.noise, self._spread(state, observations, used))
+            spread = max(self.least, self._spread(state, observations, used))
             error = np.linalg.norm(residuals(state, observations), axis=1) / spread
             dof = np.maximum(2.0 * np.bincount(observations.track[used], minlength=self.tracks) - 3.0, 1.0)
             chi = np.bincount(
@@ -326,7 +402,7 @@ class _Problem:
         sigma = float(np.sqrt((final**2).sum() / max(1, freedom)))
         return Solution(
             state, self.frames, known, held, used, observations, start.kind, self.noise, sigma, tuple(self.keys),
-            self.size, free, start.said,
+            self.size, free, start.said, self.pixel, self.views,
         )
 
     def _spread(self, state: State, observations: Observations, used: Flags) -> float:
@@ -335,24 +411,14 @@ class _Problem:
     def _between(self, start: _Start, nodal: bool) -> tuple[State, Flags, Flags]:
         """Poses between keyframes by interpolation, then each moved to where it sees the points it should."""
         cameras = start.cameras
-        at = np.asarray(self.keys)[cameras.known].astype(float)
-        turns = cameras.state.rotation[cameras.known]
         count = len(self.frames)
-        inside = np.clip(np.arange(count), at[0], at[-1])
-        rotation = Slerp(at, Rotation.from_matrix(turns))(inside).as_matrix() if len(at) > 1 else turns.repeat(count, 0)
-        centres = -np.einsum("fji,fj->fi", turns, cameras.state.translation[cameras.known])
-        centre = np.stack([np.interp(inside, at, centres[:, k]) for k in range(3)], axis=1)
-        translation = -np.einsum("fij,fj->fi", rotation, centre)
-        zoom = np.interp(inside, at, cameras.state.focal[cameras.known])
-        state = State(rotation, translation, cameras.state.points, zoom, cameras.state.lens)
+        state, reach = self._interpolated(cameras)
         held = cameras.held
         scale = 2.5 * max(self.noise, min(start.doubt, 10.0) * self.noise)
         columns = TURN if nodal else POSE
-        reach = np.flatnonzero((np.arange(count) >= at[0]) & (np.arange(count) <= at[-1]))
-        known = np.zeros(count, bool)
-        known[reach] = True
+        known = reach.copy()
         for _ in range(2):  # frames beyond the keyframes follow from their neighbours
-            rows = self.observations.take(held[self.observations.track])
+            rows = self.observations.take(held[self.observations.track] & reach[self.observations.frame])
             state = adjust(state, rows, Free(frame=columns, points=False), scale=scale, tolerance=1e-3).state
             known[:] = np.bincount(rows.frame, minlength=count) >= 4
             if nodal:
@@ -365,6 +431,29 @@ class _Problem:
             new = ~held & (least > noise**2)
             state, held = state._replace(points=np.where(new[:, None], points, state.points)), held | new
         return state, known, held
+
+    def _interpolated(self, cameras: Cameras) -> tuple[State, Flags]:
+        """All frames, and which of them have a pose: photographs that were found, and the shot between and beyond its
+        keyframes."""
+        count, alone = len(self.frames), self.views.alone
+        keys = np.asarray(self.keys)
+        rotation, translation = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+        zoom, reach = np.zeros(count), np.zeros(count, bool)
+        found = keys[cameras.known]
+        rotation[found], translation[found] = (part[cameras.known] for part in cameras.state[:2])
+        zoom[found], reach[found] = cameras.state.focal[cameras.known], True
+        at = found[~alone[found]]
+        shot = np.flatnonzero(~alone)
+        if len(at):
+            inside = np.clip(shot, at[0], at[-1])
+            turns, centres = rotation[at], -np.einsum("fji,fj->fi", rotation[at], translation[at])
+            turn = Slerp(at.astype(float), Rotation.from_matrix(turns))(inside).as_matrix() if len(at) > 1 else turns
+            centre = np.stack([np.interp(inside, at, centres[:, k]) for k in range(3)], axis=1)
+            rotation[shot], translation[shot] = turn, -np.einsum("fij,fj->fi", np.broadcast_to(
+                turn, (len(shot), 3, 3)), centre)
+            zoom[shot] = np.interp(inside, at, zoom[at])
+            reach[shot] = True
+        return State(rotation, translation, cameras.state.points, zoom, cameras.state.lens), reach
 
 
 def _nowhere(lens: Array) -> State:
