@@ -50,6 +50,7 @@ def first_groom() -> None:
         hand = hand_at(None, SIZE)
         for number, step in enumerate(STEPS, 1):
             step.do(hand, Path(folder))
+            hand.finish()
             image = reduced(window_image(hand.window), 0.75)
             cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
         hand.window.close_unasked()
@@ -70,6 +71,7 @@ def first_pose() -> None:
         hand = hand_at(None, SIZE)
         for number, step in enumerate(STEPS, 1):
             step.do(hand, Path(folder))
+            hand.finish()
             image = reduced(window_image(hand.window), 0.75)
             cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
         hand.window.close_unasked()
@@ -95,13 +97,13 @@ def match_window(plate: Path) -> None:
         desk = hand.window.desk
         hand.window.opening.open(plate)
         hand.until(lambda: bool(desk.document.plates), 60_000)
-        hand.rest()
+        hand.finish()
         hand.window.commands.run("match.features")
         hand.until(lambda: not desk.jobs.running, 240_000)
         desk.set_workspace(frame=float(desk.document.first_frame + 2))
         far = max(desk.document.tracks, key=lambda t: float(np.abs(t.points[-1] - t.points[0]).max()))
         desk.edit("Select tracks", select_tracks, (far.id,))
-        hand.rest()
+        hand.finish()
         image = reduced(window_image(hand.window), 0.75)
         cv2.imwrite(str(PICTURES / "match-window.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
         hand.window.close_unasked()

@@ -30,7 +30,7 @@ def test_random_gestures(opened: Opened, animal: Document) -> None:  # noqa: F81
     hand.key(Qt.Key.Key_Escape)
     assert not session.stroking
     assert session.document is session.history.current
-    hand.rest()
+    hand.finish()
 
 
 def _gesture(hand: Hand, rng: np.random.Generator) -> None:

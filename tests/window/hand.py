@@ -72,11 +72,21 @@ class Hand:
         self.until(lambda: not self.view.pending)
 
     def rest(self) -> None:
-        """Wait until everything is finished."""
+        """Wait until nothing goes on that changes what is shown; the picture may still become finer."""
+        self.until(self._calm, 240_000)
+
+    def finish(self) -> None:
+        """Wait until everything is finished, the picture too."""
         self.until(lambda: self.window.settled, 240_000)
 
     def until(self, true: Callable[[], bool], milliseconds: int = 15_000) -> None:
         self._bot.waitUntil(true, timeout=milliseconds)
+
+    def _calm(self) -> bool:
+        desk, picture = self.window.desk, self.view.picture
+        if desk.jobs.running or desk.session.stroking or self.view.pending:
+            return False
+        return picture is None or not picture.growing
 
     def _pen(self, eraser: bool) -> QPointingDevice:
         if eraser not in self._pens:

@@ -53,15 +53,15 @@ def take(save: Callable[[str, QImage], object]) -> None:
     hand = hand_at(document, SIZE, managed=False)
     desk = hand.window.desk
     hand.window.commands.run("view.three_quarter")
-    hand.rest()
+    hand.finish()
     hand.window.commands.run("view.frame_all")
-    hand.rest()
+    hand.finish()
     start = desk.workspace.cameras
     for name, options in OPTIONS.items():
         desk.set_workspace(view=ViewOptions(guides=False).replace(**options))
         if name == "overlays":
             hand.move((0.5, 0.5))
-        hand.rest()
+        hand.finish()
         save(name, view_image(hand.view))
     desk.set_workspace(view=ViewOptions(guides=False).replace(**COATED | {"grid": True}))
     hand.window.commands.run("view.right")
@@ -70,10 +70,10 @@ def take(save: Callable[[str, QImage], object]) -> None:
     desk.set_workspace(cameras=start, frame=1024.0)
     _settled(hand, "posed", save)
     desk.set_workspace(frame=1001.0, view=fresh_workspace().view.replace(hud=False))
-    hand.rest()
+    hand.finish()
     for theme in ("light", "dark"):
         hand.window.change_settings(theme=theme)
-        hand.rest()
+        hand.finish()
         save(f"window-{theme}", window_image(hand.window))
     hand.window.close_unasked()
 
@@ -99,7 +99,7 @@ def reduced(image: QImage, side: float = 0.5) -> NDArray[np.uint8]:
 
 
 def _settled(hand: Hand, name: str, save: Callable[[str, QImage], object]) -> None:
-    hand.rest()
+    hand.finish()
     save(name, view_image(hand.view))
 
 

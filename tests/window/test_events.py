@@ -212,7 +212,7 @@ def test_closing_and_opening_the_view_fifty_times_keeps_its_picture(hand: Hand) 
 
 def test_nothing_is_painted_at_rest(hand: Hand) -> None:
     hand.move(BACK)
-    hand.rest()
+    hand.finish()
     painted: list[int] = []
     hand.view.painted.connect(lambda: painted.append(1))
     QTest.qWait(400)
@@ -221,7 +221,7 @@ def test_nothing_is_painted_at_rest(hand: Hand) -> None:
 
 def test_the_ring_follows_the_pointer_without_a_new_picture(hand: Hand) -> None:
     hand.move(BACK)
-    hand.rest()
+    hand.finish()
     frames = hand.view.frames
     for x in (0.3, 0.4, 0.5):
         hand.move((x, 0.5))

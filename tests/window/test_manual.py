@@ -77,6 +77,7 @@ def test_the_first_groom_followed_literally_makes_its_picture(home: Path, qapp: 
     assert groom.guides.hold.max() > 0.5
     saved = Session.open(home / "first.filo")
     assert np.array_equal(saved.document.grooms[0].guides.points, groom.guides.points)
+    hand.finish()
     image = reduced(window_image(hand.window), 0.75)
     kept = cv2.imread(str(DOCS / "pictures" / picture_of(len(STEPS))))
     assert image.shape == kept.shape
