@@ -29,6 +29,7 @@ from core.random import rand
 
 TESTED = (FOCAL, K1, ASPECT, CENTRE_X, CENTRE_Y)
 SAMPLES = 24
+MOST = 300  # points the certainty is told from
 GAIN = 30.0  # of the squares over the variance: a fixed parameter is wrong
 NOISE, TOO_NOISY = 1.3, 3.0  # residuals over the noise of the tracks: said; refused
 FOCAL_SIGMA = 0.03
@@ -126,19 +127,29 @@ def _rms(rows: Rows, length: Array, count: int) -> Array:
     return np.asarray(np.where(seen > 0, np.sqrt(total / np.maximum(seen, 1)), np.nan))
 
 
+def _most_seen(solution: Solution) -> Rows:
+    """Rows of the points that certainty is told from: with more than `MOST` of them the rest are left out, which makes
+    it look a little worse than it is."""
+    held = np.flatnonzero(solution.held).astype(np.int32)
+    if len(held) <= MOST:
+        return held
+    seen = np.bincount(solution.observations.track[solution.used], minlength=len(solution.held))[held]
+    return np.sort(held[np.argsort(-seen, kind="stable")[:MOST]])
+
+
 class _Certainty:
     """Factors of the normal equations at the end, of what was found and of what might have been."""
 
     def __init__(self, solution: Solution) -> None:
         self._solution = solution
         state = solution.state
-        self._held = np.flatnonzero(solution.held)
+        self._held = _most_seen(solution)
         self._known = np.flatnonzero(solution.known)
         number = np.full(len(solution.held), -1, np.int32)
         number[self._held] = np.arange(len(self._held))
         place = np.full(len(solution.known), -1, np.int32)
         place[self._known] = np.arange(len(self._known))
-        part = solution.observations.take(solution.used)
+        part = solution.observations.take(solution.used & (number[solution.observations.track] >= 0))
         part = part._replace(frame=place[part.frame], track=number[part.track])
         self._state = state._replace(
             rotation=np.ascontiguousarray(state.rotation[self._known]), translation=state.translation[self._known],
