@@ -51,6 +51,7 @@ class Eye:
         self._front: tuple[Mesh, tuple[float, float, float]] | None = None
         self._looking: Mesh | None = None
         self._given: Camera | None = None  # to a workspace without one
+        self._meanwhile: tuple[object, Camera] | None = None  # until its front is found
 
     @property
     def flat(self) -> PlateEye | None:
@@ -65,13 +66,17 @@ class Eye:
         cameras = self.desk.workspace.cameras
         if cameras:
             return cameras[0]
+        if self.desk.document.meshes and self.facing is None:
+            self._find_front()
+            seen = (self.desk.document.meshes, self.size())
+            if self._meanwhile is None or self._meanwhile[0] != seen:
+                self._meanwhile = (seen, self._whole_view())
+            return self._meanwhile[1]
+        self._meanwhile = None
         camera = self._whole_view()
         if self.desk.document.meshes:
-            if self.facing is None:
-                self._find_front()  # and this camera is only for as long as that takes
-            else:
-                self._given = camera
-                self.desk.set_workspace(cameras=(camera,))
+            self._given = camera
+            self.desk.set_workspace(cameras=(camera,))
         return camera
 
     def resized(self) -> None:
