@@ -11,6 +11,7 @@ from core.field import field
 from core.groom.groom import Groom
 from core.image.plate import Plate
 from core.match.outline import Mask
+from core.match.photomodel.records import Photomodel
 from core.match.track import PlaneTrack, Track
 from core.mesh.mesh import Mesh
 from core.pose.pose import Pose
@@ -76,6 +77,7 @@ class Document(Record):
     meshes, grooms, plates, tracks, planes, masks : each with ids unique among their kind; the last three are of a
         plate.
     track_selection : ids of the selected tracks, the active one last; ids of deleted ones mean nothing.
+    photomodels : models from photographs, each with an id of its own.
     """
 
     unit: Annotated[str, field(
@@ -101,6 +103,7 @@ class Document(Record):
     planes: tuple[PlaneTrack, ...] = ()
     masks: tuple[Mask, ...] = ()
     track_selection: tuple[int, ...] = ()
+    photomodels: tuple[Photomodel, ...] = ()
 
     def __post_init__(self) -> None:
         if self.unit not in METRES_PER_UNIT:
@@ -122,6 +125,12 @@ class Document(Record):
             for item in items:
                 if item.plate_id not in plate_ids:
                     raise ValueError(f"Document.{kind}: the plate {item.plate_id} of {item.name!r} does not exist")
+        if len({model.id for model in self.photomodels}) != len(self.photomodels):
+            raise ValueError("Document.photomodels holds two of the same id")
+        for model in self.photomodels:
+            for photo in model.photos:
+                if photo.plate_id and photo.plate_id not in plate_ids:
+                    raise ValueError(f"Document.photomodels: there is no plate {photo.plate_id} of {photo.name!r}")
         for groom in self.grooms:
             if groom.mesh_id not in mesh_ids:
                 raise ValueError(f"Document.grooms: the mesh {groom.mesh_id} of groom {groom.name!r} does not exist")

@@ -1,7 +1,7 @@
 """The same places found in photographs: features of every picture, matched between pairs, joined into tracks.
 
-(Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", 2004; the root of the descriptors by Arandjelovic and
-Zisserman, "Three things everyone should know to improve object retrieval", 2012.)
+(Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", 2004; the root of the descriptors by Arandjelovic
+and Zisserman, "Three things everyone should know to improve object retrieval", 2012.)
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Features(NamedTuple):
 
 def features(grey: NDArray[np.uint8], most: int = 4000) -> Features:
     """The strongest features of a picture (H, W) uint8."""
-    points, words = cv2.SIFT_create(most, contrastThreshold=0.02).detectAndCompute(grey, None)
+    points, words = cv2.SIFT.create(most, contrastThreshold=0.02).detectAndCompute(grey, None)
     if words is None or not len(points):
         return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
     words = np.sqrt(words / np.maximum(words.sum(axis=1, keepdims=True), 1e-9)).astype(np.float32)

@@ -220,13 +220,14 @@ def check(constraint: Constraint, points: int) -> None:
 class Pull:
     """Constraints as a quadratic cost on points, as :func:`core.match.solve.bundle.adjust` asks for it.
 
-    scale : size of the scene; hard constraints are held to `HARD` of it.
+    scale : size of the scene; hard constraints are held to `hard` of it.
     """
 
-    def __init__(self, constraints: Sequence[Constraint], points: int, scale: float) -> None:
+    def __init__(self, constraints: Sequence[Constraint], points: int, scale: float, hard: float = HARD) -> None:
         for one in constraints:
             check(one, points)
         self.constraints, self._count, self._scale = tuple(constraints), points, max(scale, TINY)
+        self._hard = hard
 
     def cost(self, points: Array) -> float:
         """Sum of the whitened squares at points (P, 3)."""
@@ -256,7 +257,7 @@ class Pull:
     def _whitened(self, one: Constraint, points: Array) -> Rows:
         kind = KINDS[one.kind]
         rows = kind.rows(points[list(one.points)], one.value)
-        sigma = one.sigma or HARD * (1.0 if kind.angular else self._scale)
+        sigma = one.sigma or self._hard * (1.0 if kind.angular else self._scale)
         return Rows(rows.residual / sigma, rows.by_point / sigma)
 
 

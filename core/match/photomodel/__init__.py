@@ -1,0 +1,1 @@
+"""Models from photographs: picks, their solve, and what is built upon them."""
