@@ -19,7 +19,7 @@ from core.errors import UserError
 
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
 COMMANDS = (
-    "window", "groom", "convert", "info", "check", "render", "pose", "track",
+    "window", "groom", "feathers", "convert", "info", "check", "render", "pose", "track",
     "flow", "solve", "run", "bench", "doctor", "demo",
 )
 HELP = ("-h", "--help")

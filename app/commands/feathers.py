@@ -1,0 +1,186 @@
+"""``filoplume feathers MESH -o OUT``: a bird in, a coat of feathers out."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.deliver import posed_document
+from app.report import Report, peak_megabytes
+from core.document import Document, MeshObject
+from core.errors import UserError
+from core.evaluator import Evaluator
+from core.feather.coat.coat import PLACEMENTS, FeatherCoat
+from core.feather.coat.dress import KEYS, Dressed, dress_feathers
+from core.feather.coat.export import instances, left_crossing, shown_rows
+from core.feather.coat.plumage import Laid, Plumage
+from core.formats import rig_file
+from core.formats.atomic import atomic_write
+from core.formats.curve_file import maker
+from core.formats.mesh_file import read_mesh
+from core.formats.rig_assembly import NoRig
+from core.formats.usd_feathers import SUFFIXES, FeatherFrame, FeatherWriter
+from core.mesh.skin import Skin
+
+CHOICES = tuple(kind for kind in PLACEMENTS if kind not in ("hand", "field"))  # these need an artist
+EXPORTED = ("age", "spacing", "tract")
+
+
+def command(
+    mesh: Annotated[Path, typer.Argument(help="The bird: OBJ, PLY, STL, OFF, GLB/glTF, USD, Alembic.", show_default=False)],
+    output: Annotated[list[Path], typer.Option("--output", "-o", help="Where the coat goes: .usdc .usda .usd. May be given again.", show_default=False)],
+    count: Annotated[int, typer.Option(min=0, max=2_000_000, help="Feathers, exactly.")] = 10_000,
+    preset: Annotated[str, typer.Option(help="The bird the feathers are of.")] = "goldfinch",
+    placement: Annotated[str, typer.Option(help=f"How feathers are set: {', '.join(CHOICES)}.")] = "rows",
+    keys: Annotated[int, typer.Option(min=1, max=100_000, help="Keys laid along the body, exactly.")] = KEYS,
+    overlap: Annotated[float, typer.Option(min=0.1, max=50.0, help="How many rows a feather covers.")] = 3.7,
+    frames: Annotated[str | None, typer.Option(help="Frames to write, as A-B; the mesh must move.")] = None,
+    each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
+    unit: Annotated[str | None, typer.Option(help="Unit of the file where it does not say: m, cm, mm, in, ft.")] = None,
+    up: Annotated[str | None, typer.Option(help="Up axis of the file where it does not say: y or z.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of everything random; the same seed gives the same coat.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Set feathers on a bird, lay them over one another so that none passes through another, and write them."""
+    report = Report(as_json)
+    if placement not in CHOICES:
+        raise typer.BadParameter(f"placement is one of {', '.join(CHOICES)}, not {placement!r}")
+    wanted = frame_range(frames)
+    _check(output)
+    evaluator = Evaluator()
+    with report.working(total=5 + len(output)):
+        with report.stage("load", f"reading {mesh.name}"):
+            document = _document(mesh, unit, up, wanted is not None, report)
+        item = document.meshes[0]
+        with report.stage("keys", "laying keys along the body"):
+            dressed = dress_feathers(
+                item.mesh, evaluator, count, preset, placement, keys, seed, overlap, mesh_id=item.id)
+        plumage = Plumage(evaluator)
+        with report.stage("place", "setting feathers"):
+            plumage.bed(dressed.coat, dressed.keys, item.mesh)
+        with report.stage("layer", "laying feathers over one another"):
+            rest = plumage.at_rest(dressed.coat, dressed.keys, item.mesh)
+        found = _written(output, document, dressed, plumage, rest, wanted, each, evaluator, report)
+    result = {
+        "keys": len(dressed.keys.guides), **found, "seconds": report.seconds, "peak_mb": peak_megabytes(),
+        "outputs": [str(path) for path in output], "preset": preset, "placement": placement, "seed": seed,
+    }
+    report.done(result, [
+        f"{found['feathers']:,} feathers from {result['keys']:,} keys on {item.name} in "
+        f"{sum(report.seconds.values()):.1f} s; {found['crossings']} crossings, {found['skin_hits']} in the skin",
+        *result["outputs"],
+    ])
+
+
+def frame_range(words: str | None) -> tuple[int, int] | None:
+    """The frames of "A-B" (or of "A" alone), None where none are named; wrong usage when it is neither."""
+    if words is None:
+        return None
+    sign, rest = ("-", words[1:]) if words.startswith("-") else ("", words)
+    first, _, last = rest.partition("-")
+    try:
+        begin = int(sign + first)
+        end = int(last) if last else begin
+    except ValueError:
+        raise typer.BadParameter(f"frames are two numbers such as 1001-1024, not {words!r}") from None
+    if end < begin:
+        raise typer.BadParameter(f"the last frame {end} comes before the first, {begin}")
+    return begin, end
+
+
+def _check(outputs: list[Path]) -> None:
+    for path in outputs:
+        if path.suffix.lower() not in SUFFIXES:
+            raise UserError(f"{path.name}: feathers are written as {', '.join(SUFFIXES)}; choose one of these suffixes")
+        if not path.resolve().parent.is_dir():
+            raise UserError(f"the folder {path.resolve().parent} does not exist; make it first")
+        if path.is_dir():
+            raise UserError(f"{path} is a folder; name a file")
+
+
+def _document(path: Path, unit: str | None, up: str | None, moving: bool, report: Report) -> Document:
+    """The mesh of a file, with what moves it when frames are asked for."""
+    if moving and path.suffix.lower() in rig_file.READ_SUFFIXES:
+        try:
+            return rig_file.document_of(rig_file.read_rig(path, unit=unit, up=up, say=report.note))
+        except NoRig:
+            report.note(f"nothing in {path.name} moves; every frame will be the same")
+    source = read_mesh(path, unit=unit, up=up, say=report.note)
+    return Document(meshes=(MeshObject(id=1, name=source.name, mesh=source.mesh),))
+
+
+def _written(
+    outputs: list[Path], document: Document, dressed: Dressed, plumage: Plumage, rest: Laid,
+    wanted: tuple[int, int] | None, each: bool, evaluator: Evaluator, report: Report,
+) -> dict[str, object]:
+    """Write every frame to every output; the worst counts of all frames, made on what was written."""
+    item = document.meshes[0]
+    numbers = [rest_frame(document)] if wanted is None else list(range(wanted[0], wanted[1] + 1))
+    figures: dict[str, object] = {}
+    with ExitStack() as stack:
+        writers = []
+        for path in outputs:
+            temporary = stack.enter_context(atomic_write(path))
+            writers.append(FeatherWriter(
+                temporary, dressed.coat.name, item.mesh, maker(), (0.32, 0.24, 0.14), wanted is not None,
+                document.fps))
+        for frame in numbers:
+            with report.stage("frames", f"frame {frame}"):
+                laid = rest
+                if wanted is not None:
+                    skin: Skin = posed_document(document, float(frame), evaluator)[item.id]
+                    laid = plumage.at_frame(dressed.coat, dressed.keys, item.mesh, skin, float(frame))
+                written, made = export_frame(dressed.coat, laid, frame, each, evaluator)
+            figures = _worse(figures, made)
+            with report.stage("export", f"writing frame {frame}"):
+                for writer in writers:
+                    writer.write(written)
+        for writer in writers:
+            writer.close(*(map(float, wanted) if wanted is not None else ()))
+    return figures
+
+
+def _worse(one: dict[str, object], other: dict[str, object]) -> dict[str, object]:
+    """The figures of the worst frame: the greater of every number, the longer list."""
+    if not one:
+        return other
+    size = {key: len(value) if isinstance(value, list) else value for key, value in one.items()}
+    return {
+        key: value if (len(value) if isinstance(value, list) else value) >= size[key] else one[key]  # type: ignore[operator]
+        for key, value in other.items()
+    }
+
+
+def rest_frame(document: Document) -> int:
+    """The frame at which a coat at rest takes its animated values."""
+    return document.first_frame
+
+
+def export_frame(
+    coat: FeatherCoat, laid: Laid, frame: float, each: bool, evaluator: Evaluator
+) -> tuple[FeatherFrame, dict[str, object]]:
+    """One frame as it is written, and what crosses in it."""
+    rows = shown_rows(laid)
+    attributes = {name: laid.fields[name][rows] for name in EXPORTED if name in laid.fields}
+    figures: dict[str, object]
+    if each:
+        left = left_crossing(laid, evaluator.workers)
+        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], laid.layered.vanes[rows], attributes)
+        figures = {}
+    else:
+        found = instances(laid, evaluator.workers)
+        left = found.left
+        made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
+        figures = {
+            "shapes": len(found.prototypes), "quantising_error": found.error,
+            "crossings_16_bit": len(found.coarse.first),
+        }
+    ids = laid.ids[rows]
+    worst = [[int(ids[a]), int(ids[b])] for a, b in zip(left.first, left.second, strict=True)]
+    return made, {
+        "feathers": len(rows), "crossings": len(left.first), "skin_hits": len(left.skin), "pairs": left.pairs,
+        **figures, "worst": worst[:100],
+    }

@@ -1,0 +1,156 @@
+"""Feathers as another program takes them: rigid instances of a few hundred shapes, or every one its own mesh.
+
+A shape is quantised in what a feather is bent, cupped and twisted by over its length, and in its outline; the error of
+that is measured on the vanes. As neighbours lie close, the quantised feathers are settled once more, turned and scaled
+but not reshaped, and what crosses is counted on exactly what is written.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.feather.coat.crossing import vane_boxes
+from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
+from core.feather.coat.plumage import Laid
+from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.workers import Workers
+
+STEPS = np.array([0.08, 0.12, 0.10])  # radians over the length of a feather, of bend, cup and twist
+OUTLINE_STEP = 0.03  # of a half width
+
+
+class Instances(NamedTuple):
+    """N feathers of one frame as rigid copies of prototypes.
+
+    ids : (N,) int32. keys : (N, 4) int32, the bins of bend, cup, twist and outline, naming a prototype.
+    positions : (N, 3) float32. turns : (N, 4) float32, quaternions w, x, y, z. scales : (N,) float32, metres.
+    prototypes : bins -> its vane (R, C, 3) float32 at length 1.
+    error : the largest distance of a vane from what it stands for, over its length. left : what crosses, on these;
+    coarse : the same for a reader that only knows turns of 16 bits.
+    vanes : (N, R, C, 3) float32, what another program makes of it.
+    """
+
+    ids: NDArray[np.int32]
+    keys: NDArray[np.int32]
+    positions: NDArray[np.float32]
+    turns: NDArray[np.float32]
+    scales: NDArray[np.float32]
+    prototypes: dict[tuple[int, ...], NDArray[np.float32]]
+    error: float
+    left: Crossings
+    coarse: Crossings
+    vanes: NDArray[np.float32]
+
+
+def shown_rows(laid: Laid) -> NDArray[np.int32]:
+    """Rows of the feathers that are written."""
+    return np.flatnonzero(laid.shown).astype(np.int32)
+
+
+def left_crossing(laid: Laid, workers: Workers) -> Crossings:
+    """What crosses among the feathers shown, as meshes of their own; rows are those of the feathers shown."""
+    rows = shown_rows(laid)
+    kept = Layered(
+        laid.layered.poses[rows], laid.layered.vanes[rows], laid.layered.boxes[rows], laid.layered.first,
+        laid.layered.second,
+    )
+    return crossings(kept, laid.skin.bvh, workers)
+
+
+def instances(laid: Laid, workers: Workers) -> Instances:
+    """The feathers shown as instances of quantised shapes."""
+    rows = shown_rows(laid)
+    poses = laid.layered.poses[rows]
+    length = poses[:, LENGTH]
+    turning = poses[:, [BEND, CUP, TWIST]] * length[:, None]
+    own = laid.feathers.own[rows]
+    half = np.abs(own[..., 0]).max(axis=(1, 2)) if len(rows) else np.zeros(0)
+    keys = np.column_stack([np.round(turning / STEPS), np.round(half / OUTLINE_STEP)]).astype(np.int32)
+    bins, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    shapes = np.zeros((len(bins), POSE))
+    shapes[:, [BEND, CUP, TWIST]] = bins[:, :3] * STEPS
+    shapes[:, LENGTH] = 1.0
+    outlines = own[first].copy()
+    # one outline for the whole bin: that of the bin's middle
+    scale = np.maximum(bins[:, 3], 0.5) * OUTLINE_STEP / np.maximum(half[first], 1e-9)
+    outlines[..., 0] *= scale[:, None, None].astype(np.float32)
+    upright = np.broadcast_to(np.eye(3, dtype=np.float32), (len(bins), 3, 3)).copy()
+    vanes = pose_vanes(outlines, shapes, np.zeros((len(bins), 3), np.float32), upright, ranges=workers.ranges)
+    error = _error(own, turning, vanes, which, workers)
+    rigid = np.zeros((len(rows), POSE))
+    rigid[:, [LIFT, ROLL, LENGTH]] = poses[:, [LIFT, ROLL, LENGTH]]
+    feathers = Feathers(
+        np.ascontiguousarray(vanes[which]), np.ascontiguousarray(laid.feathers.roots[rows]),
+        np.ascontiguousarray(laid.feathers.frames[rows]), np.ascontiguousarray(laid.feathers.rank[rows]),
+    )
+    near = np.full((len(rows), 1), -1, np.int32)  # nobody follows: each has its place already
+    settled = layer(feathers, rigid, near, laid.skin.bvh, workers, bent_back=0.0)
+    turns = quaternions(feathers.frames, settled.poses).astype(np.float32)
+    scales = settled.poses[:, LENGTH].astype(np.float32)
+    written = _instanced(feathers.own, feathers.roots, turns, scales)
+    rounded = _instanced(feathers.own, feathers.roots, turns.astype(np.float16), scales)
+    left, coarse = (
+        crossings(settled._replace(vanes=v, boxes=vane_boxes(v, workers.ranges)), laid.skin.bvh, workers)
+        for v in (written, rounded)
+    )
+    return Instances(
+        laid.ids[rows], keys, feathers.roots, turns, scales,
+        {tuple(int(v) for v in key): vanes[k] for k, key in enumerate(bins)}, error, left, coarse, written,
+    )
+
+
+def _error(
+    own: NDArray[np.float32], turning: NDArray[np.float64], vanes: NDArray[np.float32], which: NDArray[np.int64],
+    workers: Workers,
+) -> float:
+    """The largest distance between the vanes and their prototypes, both at length 1."""
+    if not len(own):
+        return 0.0
+    exact = np.zeros((len(own), POSE))
+    exact[:, [BEND, CUP, TWIST]] = turning
+    exact[:, LENGTH] = 1.0
+    upright = np.broadcast_to(np.eye(3, dtype=np.float32), (len(own), 3, 3)).copy()
+    true = pose_vanes(own, exact, np.zeros((len(own), 3), np.float32), upright, ranges=workers.ranges)
+    return float(np.linalg.norm(true - vanes[which], axis=-1).max())
+
+
+def quaternions(frames: NDArray[np.float32], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternions (N, 4), w first, that take a vane in its own frame to its lift and roll on the skin."""
+    f = frames.astype(np.float64)
+    cl, sl = np.cos(poses[:, LIFT]), np.sin(poses[:, LIFT])
+    cr, sr = np.cos(poses[:, ROLL]), np.sin(poses[:, ROLL])
+    zero, one = np.zeros(len(f)), np.ones(len(f))
+    roll = np.stack([np.stack([cr, zero, -sr], -1), np.stack([zero, one, zero], -1), np.stack([sr, zero, cr], -1)], 1)
+    lift = np.stack([np.stack([one, zero, zero], -1), np.stack([zero, cl, -sl], -1), np.stack([zero, sl, cl], -1)], 1)
+    m = np.swapaxes(f, 1, 2) @ lift @ roll
+    # the largest of the four squares first (Shepperd, "Quaternion from rotation matrix", 1978)
+    trace = m[:, 0, 0] + m[:, 1, 1] + m[:, 2, 2]
+    squares = np.stack([trace, m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]], axis=1)
+    cases = np.empty((4, len(f), 4))
+    cases[0] = np.stack(
+        [1.0 + trace, m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
+    cases[1] = np.stack(
+        [m[:, 2, 1] - m[:, 1, 2], 1.0 + 2.0 * m[:, 0, 0] - trace, m[:, 0, 1] + m[:, 1, 0], m[:, 0, 2] + m[:, 2, 0]], 1)
+    cases[2] = np.stack(
+        [m[:, 0, 2] - m[:, 2, 0], m[:, 0, 1] + m[:, 1, 0], 1.0 + 2.0 * m[:, 1, 1] - trace, m[:, 1, 2] + m[:, 2, 1]], 1)
+    cases[3] = np.stack(
+        [m[:, 1, 0] - m[:, 0, 1], m[:, 0, 2] + m[:, 2, 0], m[:, 1, 2] + m[:, 2, 1], 1.0 + 2.0 * m[:, 2, 2] - trace], 1)
+    found = cases[np.argmax(squares, axis=1), np.arange(len(f))] if len(f) else np.zeros((0, 4))
+    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-30))
+
+
+def _instanced(
+    own: NDArray[np.float32], positions: NDArray[np.float32], turns: NDArray[np.floating], scales: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Vanes as a reader of the file places them: its turns are made unit again, as OpenUSD does."""
+    q = turns.astype(np.float64)
+    q /= np.maximum(np.linalg.norm(q, axis=1, keepdims=True), 1e-30)
+    w, v = q[:, 0, None, None, None], q[:, None, None, 1:]
+    p = own.astype(np.float64) * scales[:, None, None, None]
+    cross = np.cross(np.broadcast_to(v, p.shape), p)
+    turned = p + 2.0 * (w * cross + np.cross(np.broadcast_to(v, p.shape), cross))
+    return (turned + positions[:, None, None, :]).astype(np.float32)

@@ -1,0 +1,378 @@
+"""A coat of feathers evaluated: static calculations once, those of a frame apart (the production rule of 2001).
+
+Stages remember what they were made from by identity: combing keys comes in at the interpolation, a frame at the
+carrying. Nothing here reads another frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core import value as values
+from core.curve import Curve
+from core.evaluator import Evaluator
+from core.feather.coat.bed import Bed, bind_to_keys, field_directions, make_bed
+from core.feather.coat.coat import FEATHER_FIELDS, FEATHER_VALUES, FeatherCoat
+from core.feather.coat.crossing import vane_boxes
+from core.feather.coat.ground import curvatures, smoothed
+from core.feather.coat.keys import attributes_of_keys, interpolate, interpolate_directions, key_shapes
+from core.feather.coat.layering import Feathers, Layered, layer, layer_again
+from core.feather.coat.order import growth_order, roll_sides
+from core.feather.coat.outline import coarse_vanes
+from core.feather.coat.place import place_feathers
+from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.groom.groom import Groom, Map
+from core.groom.maps import sample_map
+from core.mesh.intrinsic import Binding
+from core.mesh.mesh import Mesh
+from core.mesh.skin import Skin, skin_at_rest
+from core.mesh.surface import root_frames, root_positions
+from core.random import rand
+from core.value import Formula, Value, evaluate_within, names_used
+
+STANDING = 0.21  # radians, lift of feathers without keys
+HALF_WIDTH = 0.23  # of the length
+BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
+ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
+FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
+
+
+class Base(NamedTuple):
+    """Feathers before they settle.
+
+    feathers : vanes, roots, frames and ranks. poses : (N, 6) float64. fields : named columns (N,) expressions read.
+    """
+
+    feathers: Feathers
+    poses: NDArray[np.float64]
+    fields: dict[str, Any]
+
+
+class Laid(NamedTuple):
+    """A coat at one frame, the rows those of the bed.
+
+    ids : (N,) int32. shown : (N,) bool, what density keeps. layered : poses, vanes, boxes.
+    feathers : vanes at length 1, roots, frames. skin : the skin in the same pose.
+    """
+
+    ids: NDArray[np.int32]
+    shown: NDArray[np.bool_]
+    layered: Layered
+    feathers: Feathers
+    bed: Bed
+    skin: Skin
+    fields: dict[str, Any]
+
+
+class Plumage:
+    """Evaluates one coat again and again. Mutable; owned by whoever shows, exports or measures it.
+
+    Parameters
+    ----------
+    evaluator : whose threads and memory are used.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+        self._memory: dict[str, tuple[tuple[Any, ...], Any]] = {}
+
+    def at_rest(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, frame: float = 1001.0) -> Laid:
+        """The coat on the mesh at rest; animated values as at `frame`."""
+        bed, binding = self.bed(coat, keys, mesh), self._binding(coat, keys, mesh)
+        base = self._remember(
+            "base", lambda: self._base(coat, keys, mesh, bed, binding, frame), coat, keys, mesh, frame)
+        skin = skin_at_rest(mesh, self._evaluator)
+        layered = self._remember("layer", lambda: self._layer(coat, base, bed, skin), coat.layered, base)
+        return self._laid(coat, bed, layered, base, skin, frame)
+
+    def at_frame(
+        self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, skin: Skin, frame: float, rest_frame: float = 1001.0
+    ) -> Laid:
+        """The coat on `skin`, the mesh as it is posed at `frame`, from the order and the settling at rest."""
+        rest = self.at_rest(coat, keys, mesh, rest_frame)
+        still = skin.points is mesh.points
+        if still and not any(moves(getattr(coat, name)) for name in FEATHER_VALUES):
+            return rest
+        bed, workers = rest.bed, self._evaluator.workers
+        base = self._base(coat, keys, mesh, bed, self._binding(coat, keys, mesh), rest_frame, skin, frame)
+        resting = self._memory["base"][1]
+        poses = base.poses + (rest.layered.poses - resting.poses)
+        poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
+        if coat.layered:
+            layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, may_shorten=False)
+        else:
+            layered = _unlayered(base.feathers, poses, workers.ranges)
+        return self._laid(coat, bed, layered, base, skin, frame)
+
+    def bed(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh) -> Bed:
+        """Where the feathers of a coat stand."""
+        maps = () if keys is None else keys.maps
+        made: Bed = self._remember(
+            "bed", lambda: make_bed(coat, mesh, place_feathers(coat, mesh, maps, self._evaluator), self._evaluator),
+            mesh, coat.placements, coat.tracts, maps,
+        )
+        return made
+
+    # -- stages --------------------------------------------------------------------------------------------
+
+    def _remember(self, name: str, make: Callable[[], Any], *inputs: Any) -> Any:
+        known = self._memory.get(name)
+        if known is not None and all(a is b for a, b in zip(known[0], inputs, strict=True)):
+            return known[1]
+        made = make()
+        self._memory[name] = (inputs, made)
+        return made
+
+    def _binding(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh) -> Binding | None:
+        if keys is None or not len(keys.guides):
+            return None
+        bed, guides = self.bed(coat, keys, mesh), keys.guides
+        if not len(bed.places.ids):
+            return None
+        return self._remember(
+            "binding", lambda: bind_to_keys(mesh, guides, bed.places, self._evaluator), bed, guides.roots
+        )
+
+    def _layer(self, coat: FeatherCoat, base: Base, bed: Bed, skin: Skin) -> Layered:
+        workers = self._evaluator.workers
+        if not coat.layered:
+            return _unlayered(base.feathers, base.poses, workers.ranges)
+        before = self._memory.get("layer")
+        if before is not None:
+            known_base, laid = before[0][1], before[1]
+            changed = changed_rows(known_base, base)
+            if changed is not None and len(changed) < len(base.poses) // 4 and before[0][0] is coat.layered:
+                return layer_again(base.feathers, laid, base.poses, changed, skin.bvh, workers)
+        return layer(base.feathers, base.poses, bed.ground.near, skin.bvh, workers)
+
+    def _base(
+        self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None, rest_frame: float,
+        skin: Skin | None = None, frame: float | None = None,
+    ) -> Base:
+        """Poses before settling, at rest (skin None) or carried to a posed skin."""
+        ranges = self._evaluator.workers.ranges
+        near, count = bed.ground.near, len(bed.places.ids)
+        directions = self._directions(coat, keys, mesh, bed, binding)
+        rest_frames, flow_frames = directions
+        bend_of = self._remember(
+            "curvature", lambda: _curved(bed.positions, flow_frames, near, ranges), bed, directions)
+        fields = self._fields(coat, keys, mesh, bed, binding, directions, bend_of)
+        rank, sides = self._remember("order", lambda: _ordered(bed, flow_frames, ranges), bed, directions)
+        own = self._remember("own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields)
+        now = rest_frame if frame is None else frame
+        numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
+        positions, normals, frames = bed.positions, bed.normals, rest_frames
+        if skin is not None:
+            positions, frames, flow = _carried(mesh, bed, rest_frames, flow_frames, skin)
+            normals = frames[:, 2].astype(np.float64)
+            bend_of = _curved(positions, flow, near, ranges)
+        ids, seed = bed.places.ids, _seed(coat)
+        spread = [coat.variation * (2.0 * rand(ids, seed + 301 + k) - 1.0) for k in range(4)]
+        wind = _unit(np.asarray(coat.wind_direction, np.float64)[None])[0] * np.ones((count, 1))
+        behind = np.maximum(-np.einsum("nc,nc->n", wind, frames[:, 1]), 0.0) * numbers["wind"]
+        aside = np.einsum("nc,nc->n", wind, frames[:, 0]) * numbers["wind"]
+        yaw = numbers["yaw"] + FAN[0] * spread[0] + 0.4 * aside
+        up = numbers["ruffle"] * (0.1 + 0.6 * rand(ids, seed + 311)) + 0.45 * numbers["puff"] + 0.7 * behind
+        length = fields["length"] * numbers["length"] * (1.0 + FAN[3] * spread[3])
+        limit = _limited(fields["length"], bend_of) if skin is None else fields["limit"]
+        if skin is None:
+            fields["limit"] = limit
+        length = np.maximum(length * limit, 1e-12)
+        poses = np.empty((count, POSE))
+        # what the keys' lift varies by is small beside the lift itself, or feathers would lean into the skin
+        poses[:, LIFT] = fields["lift"] * (1.0 + 0.4 * spread[1]) + numbers["lift"] + up
+        poses[:, ROLL] = numbers["roll"] * sides + FAN[2] * spread[2] * 0.5
+        poses[:, LENGTH] = length
+        curl = fields["turn"] + numbers["curl"] - 0.5 * numbers["puff"] - 0.5 * up
+        poses[:, BEND] = np.clip(bend_of[:, 1] - fields["skin_turn"] - curl / length, -1.2 / length, 1.6 / length)
+        poses[:, CUP] = np.clip(bend_of[:, 0], -0.5 / length, 2.0 / length)
+        poses[:, TWIST] = np.clip(bend_of[:, 2], -0.6 / length, 0.6 / length)
+        frames = _turned(frames, yaw)
+        roots = positions + (ABOVE_SKIN * bed.ground.spacing[:, None] * normals).astype(np.float32)
+        feathers = Feathers(own, np.ascontiguousarray(roots, np.float32), frames, rank)
+        return Base(feathers, poses, fields)
+
+    def _directions(
+        self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Frames (N, 3, 3) of the feathers and, smoother, of the flow they lie in; rows right, along, out."""
+        if binding is not None and keys is not None and coat.direction == "keys":
+            guides = keys.guides
+            return self._remember(
+                "directions", lambda: _key_frames(guides, binding, bed, self._evaluator.workers.ranges),
+                bed, binding, guides.points, coat.direction,
+            )
+        field = self._remember(
+            "field", lambda: field_directions(coat.direction, coat.strokes, mesh, self._evaluator),
+            mesh, coat.direction, coat.strokes,
+        )
+        return self._remember(
+            "directions", lambda: _field_frames(field, bed, mesh, self._evaluator), bed, field, None, coat.direction
+        )
+
+    def _fields(
+        self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None,
+        directions: tuple[NDArray[np.float32], NDArray[np.float32]], bend_of: NDArray[np.float64],
+    ) -> dict[str, Any]:
+        """What keys say of every feather, and what expressions may read; frame-independent."""
+        guides = None if keys is None else keys.guides
+
+        def make() -> dict[str, Any]:
+            count = len(bed.places.ids)
+            spacing = smoothed(bed.ground.spacing.astype(np.float64)[:, None], bed.ground.near, 2)[:, 0]
+            fields: dict[str, Any] = {
+                "id": bed.places.ids, "tract": bed.tract, "age": bed.age, "spacing": spacing,
+                "length": coat.overlap * spacing, "lift": np.full(count, STANDING), "turn": np.zeros(count),
+                "skin_turn": np.zeros(count),
+            }
+            if mesh.uvs is not None:
+                fields["u"], fields["v"] = bed.roots.uvs[:, 0], bed.roots.uvs[:, 1]
+            if binding is not None and guides is not None:
+                scalars = interpolate(key_shapes(guides).scalars, binding)
+                fields["lift"], fields["length"] = scalars[:, 0], scalars[:, 1]
+                # a key that follows the body turns with it; only what it turns beyond that is a curl
+                fields["turn"] = scalars[:, 2] + bend_of[:, 1] * scalars[:, 1] * 0.75
+                fields["turn"] = np.where(np.abs(fields["turn"]) < 0.05, 0.0, fields["turn"])
+                given = coat.key_attributes
+                if given is not None and len(given.names):
+                    table = attributes_of_keys(guides, given, given.values.mean(axis=0))
+                    mixed = interpolate(table, binding)
+                    fields.update({name: mixed[:, k] for k, name in enumerate(given.names)})
+            return fields
+
+        points = None if guides is None else guides.points
+        found: dict[str, Any] = self._remember(
+            "fields", make, bed, binding, points, coat.key_attributes, coat.overlap, directions
+        )
+        return found
+
+    def _own(
+        self, coat: FeatherCoat, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None, bed: Bed
+    ) -> NDArray[np.float32]:
+        """Vanes of all feathers in their own frames, at length 1."""
+        width = np.broadcast_to(self._number(coat, "width", fields, frame, mesh, keys, bed), len(bed.places.ids))
+        return coarse_vanes(HALF_WIDTH * width)
+
+    def _number(
+        self, coat: FeatherCoat, name: str, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None,
+        bed: Bed,
+    ) -> Any:
+        """A value of the coat at a frame, for every feather."""
+        value: Value = getattr(coat, name)
+        skin = skin_at_rest(mesh, self._evaluator)
+        maps: tuple[Map, ...] = () if keys is None else keys.maps
+        known = dict(fields)
+        for read in names_used(value) - known.keys() - {"frame"}:
+            item = next((one for one in maps if one.name == read), None)
+            if item is not None:
+                known[read] = sample_map(item, mesh, skin.triangles, bed.places.triangle, bed.places.barycentric)
+        return evaluate_within(value, FEATHER_FIELDS[name], frame, known)
+
+    def _laid(
+        self, coat: FeatherCoat, bed: Bed, layered: Layered, base: Base, skin: Skin, frame: float
+    ) -> Laid:
+        density = np.broadcast_to(
+            values.evaluate(coat.density, frame, base.fields), len(bed.places.ids)
+        )
+        shown = rand(bed.places.ids, _seed(coat) + 401) < density
+        return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields)
+
+
+def moves(value: Value) -> bool:
+    """True when a value depends on the frame."""
+    return isinstance(value.base, Curve) or (isinstance(value.base, Formula) and "frame" in names_used(value))
+
+
+def changed_rows(before: Base, after: Base) -> NDArray[np.int32] | None:
+    """Rows (n,) int32 whose pose, frame or vane differ; None when the feathers are others."""
+    if before.feathers.own.shape != after.feathers.own.shape:
+        return None
+    if not np.array_equal(before.feathers.roots, after.feathers.roots):
+        return None
+    differ = (before.poses != after.poses).any(axis=1)
+    differ |= (before.feathers.frames != after.feathers.frames).any(axis=(1, 2))
+    if before.feathers.own is not after.feathers.own:
+        differ |= (before.feathers.own != after.feathers.own).any(axis=(1, 2, 3))
+    return np.flatnonzero(differ).astype(np.int32)
+
+
+def _seed(coat: FeatherCoat) -> int:
+    return coat.placements[0].seed if coat.placements else 0
+
+
+def _unlayered(feathers: Feathers, poses: NDArray[np.float64], ranges: Any) -> Layered:
+    vanes = pose_vanes(feathers.own, poses, feathers.roots, feathers.frames, ranges=ranges)
+    none = np.zeros(0, np.int32)
+    return Layered(poses, vanes, vane_boxes(vanes, ranges), none, none)
+
+
+def _ordered(bed: Bed, frames: NDArray[np.float32], ranges: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    sides = smoothed(roll_sides(frames)[:, None], bed.ground.near, 3, ranges)[:, 0]
+    return growth_order(bed.positions, frames, bed.ground.near, sides), sides
+
+
+def _curved(
+    positions: NDArray[np.float32], frames: NDArray[np.float32], near: NDArray[np.int32], ranges: Any
+) -> NDArray[np.float64]:
+    return smoothed(curvatures(positions, frames, near, ranges), near, 2, ranges)
+
+
+def _limited(length: NDArray[np.float64], curved: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factor (N,) on lengths where the body bends too much below them for a feather to follow it."""
+    tight = np.maximum(np.abs(curved[:, 0]), np.abs(curved[:, 1]))
+    return np.asarray(1.0 / np.sqrt(1.0 + (length * tight / BODY) ** 2))
+
+
+def _frames_of(directions: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Frames (N, 3, 3), rows right, along, out, of directions made square to unit normals."""
+    along = directions - normals * np.einsum("nc,nc->n", directions, normals)[:, None]
+    lost = np.linalg.norm(along, axis=1) < 1e-9
+    if lost.any():
+        helper = np.where(np.abs(normals[lost, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
+        along[lost] = np.cross(normals[lost], helper)
+    along = _unit(along)
+    return np.ascontiguousarray(np.stack([np.cross(along, normals), along, normals], axis=1), np.float32)
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30))
+
+
+def _key_frames(
+    guides: Any, binding: Binding, bed: Bed, ranges: Any
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    along = interpolate_directions(key_shapes(guides), binding, bed.normals)
+    frames = _frames_of(along, bed.normals)
+    return frames, frames
+
+
+def _field_frames(
+    field: NDArray[np.float32], bed: Bed, mesh: Mesh, evaluator: Evaluator
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    corners = skin_at_rest(mesh, evaluator).triangles.vertices[bed.places.triangle]
+    along = np.einsum("nk,nkc->nc", bed.places.barycentric, field[corners]).astype(np.float64)
+    frames = _frames_of(smoothed(along, bed.ground.near, 6, evaluator.workers.ranges), bed.normals)
+    return frames, frames
+
+
+def _turned(frames: NDArray[np.float32], yaw: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Frames turned about their normals, to the right above 0."""
+    c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+    right, along = frames[:, 0], frames[:, 1]
+    turned = np.stack([c * right - s * along, c * along + s * right, frames[:, 2]], axis=1)
+    return np.ascontiguousarray(turned, np.float32)
+
+
+def _carried(
+    mesh: Mesh, bed: Bed, rest_frames: NDArray[np.float32], flow_frames: NDArray[np.float32], skin: Skin
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Positions (N, 3) and frames (N, 3, 3), twice, carried by the frames of the roots to a posed skin."""
+    moved = root_frames(mesh, bed.roots, skin.points, skin.normals)
+    turn = np.einsum("nij,nik->njk", bed.roots.frames.astype(np.float64), moved)  # rest -> posed, for rows
+    positions = root_positions(mesh, bed.roots, skin.points)
+    carried = [np.ascontiguousarray(frames @ turn, np.float32) for frames in (rest_frames, flow_frames)]
+    return positions, carried[0], carried[1]
