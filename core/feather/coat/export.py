@@ -19,13 +19,13 @@ from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST,
 from core.workers import Workers
 
 STEPS = np.array([0.08, 0.12, 0.10])  # radians over the length of a feather, of bend, cup and twist
-OUTLINE_STEP = 0.03  # of a half width
+OUTLINE_STEP = 0.03  # of what an outline reaches to either side, and its tip out of the middle, in lengths
 
 
 class Instances(NamedTuple):
     """N feathers of one frame as rigid copies of prototypes.
 
-    ids : (N,) int32. keys : (N, 4) int32, the bins of bend, cup, twist and outline, naming a prototype.
+    ids : (N,) int32. keys : (N, 7) int32, the bins of bend, cup, twist and outline, naming a prototype.
     positions : (N, 3) float32. turns : (N, 4) float32, quaternions w, x, y, z. scales : (N,) float32, metres.
     prototypes : bins -> its vane (R, C, 3) float32 at length 1.
     error : the largest distance of a vane from what it stands for, over its length. left : what crosses, on these;
@@ -67,17 +67,18 @@ def instances(laid: Laid, workers: Workers) -> Instances:
     length = poses[:, LENGTH]
     turning = poses[:, [BEND, CUP, TWIST]] * length[:, None]
     own = laid.feathers.own[rows]
-    half = np.abs(own[..., 0]).max(axis=(1, 2)) if len(rows) else np.zeros(0)
-    keys = np.column_stack([np.round(turning / STEPS), np.round(half / OUTLINE_STEP)]).astype(np.int32)
+    middle = own.shape[2] // 2
+    outline = np.column_stack([
+        own[..., 0].min(axis=(1, 2), initial=0.0), own[..., 0].max(axis=(1, 2), initial=0.0), own[:, -1, middle, 0],
+        own[:, -1, middle, 2],
+    ])
+    keys = np.column_stack([np.round(turning / STEPS), np.round(outline / OUTLINE_STEP)]).astype(np.int32)
     bins, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     shapes = np.zeros((len(bins), POSE))
     shapes[:, [BEND, CUP, TWIST]] = bins[:, :3] * STEPS
     shapes[:, LENGTH] = 1.0
-    outlines = own[first].copy()
-    # one outline for the whole bin: that of the bin's middle
-    scale = np.maximum(bins[:, 3], 0.5) * OUTLINE_STEP / np.maximum(half[first], 1e-9)
-    outlines[..., 0] *= scale[:, None, None].astype(np.float32)
+    outlines = np.ascontiguousarray(own[first])
     upright = np.broadcast_to(np.eye(3, dtype=np.float32), (len(bins), 3, 3)).copy()
     vanes = pose_vanes(outlines, shapes, np.zeros((len(bins), 3), np.float32), upright, ranges=workers.ranges)
     error = _error(own, turning, vanes, which, workers)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from core import value as values
 from core.curve import Curve
 from core.evaluator import Evaluator
+from core.feather.attributes import defaults
 from core.feather.coat.bed import Bed, bind_to_keys, field_directions, make_bed
 from core.feather.coat.coat import FEATHER_FIELDS, FEATHER_VALUES, FeatherCoat
 from core.feather.coat.crossing import vane_boxes
@@ -22,9 +23,9 @@ from core.feather.coat.ground import curvatures, smoothed
 from core.feather.coat.keys import attributes_of_keys, interpolate, interpolate_directions, key_shapes
 from core.feather.coat.layering import Feathers, Layered, layer, layer_again
 from core.feather.coat.order import growth_order, roll_sides
-from core.feather.coat.outline import coarse_vanes
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.feather.vane import SHAPE_COLUMNS, vane_grids
 from core.groom.groom import Groom, Map
 from core.groom.maps import sample_map
 from core.mesh.intrinsic import Binding
@@ -34,8 +35,9 @@ from core.mesh.surface import root_frames, root_positions
 from core.random import rand
 from core.value import Formula, Value, evaluate_within, names_used
 
+ROWS, COLUMNS = 8, 5  # of a vane as it is layered
 STANDING = 0.21  # radians, lift of feathers without keys
-HALF_WIDTH = 0.23  # of the length
+SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
 BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
 ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
 FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
@@ -162,7 +164,9 @@ class Plumage:
             "curvature", lambda: _curved(bed.positions, flow_frames, near, ranges), bed, directions)
         fields = self._fields(coat, keys, mesh, bed, binding, directions, bend_of)
         rank, sides = self._remember("order", lambda: _ordered(bed, flow_frames, ranges), bed, directions)
-        own = self._remember("own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields)
+        own = self._remember(
+            "own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields, coat.attributes, coat.width,
+            None if keys is None else keys.maps)
         now = rest_frame if frame is None else frame
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
         positions, normals, frames = bed.positions, bed.normals, rest_frames
@@ -254,8 +258,18 @@ class Plumage:
         self, coat: FeatherCoat, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None, bed: Bed
     ) -> NDArray[np.float32]:
         """Vanes of all feathers in their own frames, at length 1."""
-        width = np.broadcast_to(self._number(coat, "width", fields, frame, mesh, keys, bed), len(bed.places.ids))
-        return coarse_vanes(HALF_WIDTH * width)
+        table = np.tile(defaults()[: len(SHAPE_COLUMNS)], (len(bed.places.ids), 1))
+        for name, column in SHAPE_COLUMNS.items():
+            if name in fields:
+                table[:, column] = fields[name]
+        for item in coat.attributes:
+            if item.name in SHAPE_COLUMNS:
+                table[:, SHAPE_COLUMNS[item.name]] = self._evaluated(item.value, fields, frame, mesh, keys, bed)
+        table[:, SHAPE_COLUMNS["shaftLength"]] = 1.0
+        width = self._number(coat, "width", fields, frame, mesh, keys, bed)
+        for name in SIZED[1:]:
+            table[:, SHAPE_COLUMNS[name]] *= width
+        return vane_grids(table, ROWS, COLUMNS, self._evaluator.workers.ranges)
 
     def _number(
         self, coat: FeatherCoat, name: str, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None,
@@ -263,6 +277,19 @@ class Plumage:
     ) -> Any:
         """A value of the coat at a frame, for every feather."""
         value: Value = getattr(coat, name)
+        known = self._columns(value, fields, mesh, keys, bed)
+        return evaluate_within(value, FEATHER_FIELDS[name], frame, known)
+
+    def _evaluated(
+        self, value: Value, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None, bed: Bed
+    ) -> NDArray[np.float64]:
+        """A value that is none of the coat's own fields, for every feather."""
+        return values.evaluate(value, frame, self._columns(value, fields, mesh, keys, bed))
+
+    def _columns(
+        self, value: Value, fields: dict[str, Any], mesh: Mesh, keys: Groom | None, bed: Bed
+    ) -> dict[str, Any]:
+        """The fields, and the maps a value reads."""
         skin = skin_at_rest(mesh, self._evaluator)
         maps: tuple[Map, ...] = () if keys is None else keys.maps
         known = dict(fields)
@@ -270,7 +297,7 @@ class Plumage:
             item = next((one for one in maps if one.name == read), None)
             if item is not None:
                 known[read] = sample_map(item, mesh, skin.triangles, bed.places.triangle, bed.places.barycentric)
-        return evaluate_within(value, FEATHER_FIELDS[name], frame, known)
+        return known
 
     def _laid(
         self, coat: FeatherCoat, bed: Bed, layered: Layered, base: Base, skin: Skin, frame: float
