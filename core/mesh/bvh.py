@@ -18,12 +18,15 @@ from numpy.typing import NDArray
 
 from core.mesh.bvh_build import build_tree, gather_corners, refit_boxes
 from core.mesh.bvh_kernels import LANES, any_hit_segment, closest_on_triangle, closest_one, new_stack, ray_one
+from core.mesh.morton import morton_codes
 from core.workers import Workers, serial_ranges
 
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 I32_1D = types.Array(types.int32, 1, "C", readonly=True)
 I32_2D = types.Array(types.int32, 2, "C", readonly=True)
+
+CELL_BITS = 5  # of each axis, in which closest points are looked for cell by cell
 
 __all__ = [
     "Bvh", "any_hit_segment", "build_bvh", "cast_rays", "closest_on_triangle", "closest_one", "closest_points",
@@ -98,10 +101,11 @@ def closest_points(
     triangle = np.empty(count, np.int32)
     barycentric = np.empty((count, 3), np.float32)
     distance = np.empty(count, np.float32)
+    by_place = np.argsort(_cells(bvh, queries), kind="stable").astype(np.int32)
 
     def rows(start: int, stop: int) -> None:
         _closest_rows(
-            bvh.boxes, bvh.children, bvh.order, bvh.corners, bvh.blocks, queries, float(max_distance),
+            bvh.boxes, bvh.children, bvh.order, bvh.corners, bvh.blocks, queries, by_place, float(max_distance),
             triangle, barycentric, distance, start, stop,
         )
 
@@ -161,25 +165,43 @@ def hit_segments(
     return out
 
 
+def _cells(bvh: Bvh, queries: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """Cells of the queries along a curve through the box of the skin (16 bits, which numpy sorts by radix)."""
+    box = bvh.boxes[0].reshape(2, 2, 3).astype(np.float64)
+    return morton_codes(queries, box[:, 0].min(0), box[:, 1].max(0), CELL_BITS).astype(np.uint16)
+
+
 def _ranges(workers: Workers | None) -> Callable[..., None]:
     return serial_ranges if workers is None else workers.ranges
 
 
 @njit(
     types.void(
-        F32_2D, I32_2D, I32_1D, F32_2D, F32_3D, F32_2D, types.float64,
+        F32_2D, I32_2D, I32_1D, F32_2D, F32_3D, F32_2D, I32_1D, types.float64,
         types.int32[::1], types.float32[:, ::1], types.float32[::1], types.int64, types.int64,
     ),
-    cache=True, nogil=True,
+    cache=True, nogil=True, error_model="numpy",
 )
 def _closest_rows(  # type: ignore[no-untyped-def]
-    boxes, children, order, corners, blocks, queries, max_distance, triangle, barycentric, distance, start, stop
+    boxes, children, order, corners, blocks, queries, by_place, max_distance, triangle, barycentric, distance,
+    start, stop
 ):
+    """Queries ``by_place[start:stop]``. What was nearest to the one before bounds the search for the next; a little
+    more than that is searched, so that of equally near triangles the same is found whatever came before."""
     stack, keys = new_stack()
     limit2 = max_distance * max_distance * (1.0 + 1e-12)  # a point exactly at the limit is within it
-    for i in range(start, stop):
+    last = -1
+    for at in range(start, stop):
+        i = by_place[at]
         x, y, z = queries[i, 0], queries[i, 1], queries[i, 2]
-        slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, blocks, x, y, z, limit2, stack, keys)
+        bound = limit2
+        if last >= 0:
+            known = closest_on_triangle(corners, last, np.float64(x), np.float64(y), np.float64(z))[0]
+            bound = min(limit2, known * (1.0 + 1e-5) + 1e-300) if known < limit2 else limit2
+        slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, blocks, x, y, z, bound, stack, keys)
+        if slot < 0 and bound < limit2:  # lost to rounding
+            slot, d2, b0, b1, b2 = closest_one(boxes, children, corners, blocks, x, y, z, limit2, stack, keys)
+        last = slot if slot >= 0 else last
         triangle[i] = order[slot] if slot >= 0 else -1
         barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = b0, b1, b2
         distance[i] = math.sqrt(d2) if slot >= 0 else np.inf

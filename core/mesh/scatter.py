@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.mesh.even_subset import Candidates, even_subset
+from core.mesh.morton import morton_codes
 from core.mesh.normals import face_areas, face_normals
 from core.mesh.scatter_kernels import draw_candidates, interpolate, shuffled
 from core.random import rand
@@ -121,7 +122,7 @@ class _Ground:
         if not len(order):
             raise UserError("Nothing can be scattered: no face of the mesh has finite coordinates.")
         low, high = corners.min((0, 1)), corners.max((0, 1))
-        by_place = np.argsort(_morton(corners.mean(1), low, high), kind="stable")
+        by_place = np.argsort(morton_codes(corners.mean(1), low, high), kind="stable")
         self.faces = order[by_place].astype(np.int32)
         # relative to the middle, so that float32 places keep their digits far from the origin
         self.corners = np.ascontiguousarray((corners[by_place] - (low + high) / 2).reshape(-1, 9), np.float32)
@@ -157,16 +158,6 @@ class _Ground:
             return np.maximum(top, 0.05 * top.max()).astype(np.float32), mean.astype(np.float32)
         corner = np.clip(np.asarray(density, np.float32), 0.0, 1.0)[triangles]
         return corner.max(1), corner.mean(1)
-
-
-def _morton(places: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint64]:
-    size = max(float((high - low).max()), 1e-30)
-    cells = np.clip((places - low) / size * 1023.0, 0, 1023).astype(np.uint64)
-    code = np.zeros(len(places), np.uint64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code
 
 
 def _draw(
