@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from core.errors import UserError
+from core.feather.coat.coat import FeatherCoat
 from core.field import field
 from core.groom.groom import Groom
 from core.image.plate import Plate
@@ -74,8 +75,8 @@ class MeshObject(Record):
 class Document(Record):
     """Everything undo brings back.
 
-    meshes, grooms, plates, tracks, planes, masks : each with ids unique among their kind; the last three are of a
-        plate.
+    meshes, grooms, feathers, plates, tracks, planes, masks : each with ids unique among their kind; the last three
+        are of a plate. The keys of feathers are the guides of a groom.
     track_selection : ids of the selected tracks, the active one last; ids of deleted ones mean nothing.
     photomodels : models from photographs, each with an id of its own.
     """
@@ -98,6 +99,7 @@ class Document(Record):
     )] = 1100
     meshes: tuple[MeshObject, ...] = ()
     grooms: tuple[Groom, ...] = ()
+    feathers: tuple[FeatherCoat, ...] = ()
     plates: tuple[Plate, ...] = ()
     tracks: tuple[Track, ...] = ()
     planes: tuple[PlaneTrack, ...] = ()
@@ -134,6 +136,14 @@ class Document(Record):
         for groom in self.grooms:
             if groom.mesh_id not in mesh_ids:
                 raise ValueError(f"Document.grooms: the mesh {groom.mesh_id} of groom {groom.name!r} does not exist")
+        if len({coat.id for coat in self.feathers}) != len(self.feathers):
+            raise ValueError("Document.feathers holds two coats of the same id")
+        mesh_of = {groom.id: groom.mesh_id for groom in self.grooms}
+        for coat in self.feathers:
+            if coat.mesh_id not in mesh_ids:
+                raise ValueError(f"Document.feathers: the mesh {coat.mesh_id} of {coat.name!r} does not exist")
+            if coat.keys_id is not None and mesh_of.get(coat.keys_id) != coat.mesh_id:
+                raise ValueError(f"Document.feathers: the keys of {coat.name!r} are no groom of its mesh")
 
 
 def find_mesh(document: Document, mesh_id: int) -> MeshObject:
@@ -150,6 +160,20 @@ def find_groom(document: Document, groom_id: int) -> Groom:
         if item.id == groom_id:
             return item
     raise UserError(f"There is no groom {groom_id} in this document; choose one of {[g.id for g in document.grooms]}.")
+
+
+def find_feathers(document: Document, coat_id: int) -> FeatherCoat:
+    """The coat of feathers of that id; UserError when there is none."""
+    for item in document.feathers:
+        if item.id == coat_id:
+            return item
+    known = [coat.id for coat in document.feathers]
+    raise UserError(f"There are no feathers {coat_id} in this document; choose one of {known}.")
+
+
+def keys_of(document: Document, coat: FeatherCoat) -> Groom | None:
+    """The groom whose guides are the keys of a coat of feathers, or None."""
+    return None if coat.keys_id is None else find_groom(document, coat.keys_id)
 
 
 def mesh_to_edit(document: Document, groom: Groom) -> MeshObject:
@@ -179,16 +203,25 @@ def with_groom(document: Document, groom: Groom) -> Document:
     return document.replace(grooms=_put(document.grooms, groom))
 
 
+def with_feathers(document: Document, coat: FeatherCoat) -> Document:
+    """The document with `coat` in place of the feathers of the same id, or added at the end."""
+    return document.replace(feathers=_put(document.feathers, coat))
+
+
 def without_groom(document: Document, groom_id: int) -> Document:
-    """The document without that groom."""
-    return document.replace(grooms=tuple(g for g in document.grooms if g.id != groom_id))
+    """The document without that groom; feathers whose keys it held have none any more."""
+    return document.replace(
+        grooms=tuple(g for g in document.grooms if g.id != groom_id),
+        feathers=tuple(c.replace(keys_id=None) if c.keys_id == groom_id else c for c in document.feathers),
+    )
 
 
 def without_mesh(document: Document, mesh_id: int) -> Document:
-    """The document without that mesh and without the grooms that grow on it."""
+    """The document without that mesh and without the grooms and feathers that grow on it."""
     return document.replace(
         meshes=tuple(m for m in document.meshes if m.id != mesh_id),
         grooms=tuple(g for g in document.grooms if g.mesh_id != mesh_id),
+        feathers=tuple(c for c in document.feathers if c.mesh_id != mesh_id),
     )
 
 
@@ -209,13 +242,20 @@ def problems(document: Document) -> list[str]:
     Kernels trust these (they run without bounds checks), so a file is only opened when the list is empty.
     """
     found: list[str] = []
-    for groom in document.grooms:
-        mesh, roots = find_mesh(document, groom.mesh_id).mesh, groom.guides.roots
+    rooted = [(f"Groom {groom.name!r}", groom.mesh_id, groom.guides.roots) for groom in document.grooms]
+    rooted += [
+        (f"The coat {coat.name!r}", coat.mesh_id, placement.hand)
+        for coat in document.feathers for placement in coat.placements if placement.hand is not None
+    ]
+    for owner, mesh_id, roots in rooted:
+        mesh = find_mesh(document, mesh_id).mesh
         if len(roots.faces):
             if roots.faces.min() < 0 or roots.faces.max() >= len(mesh.counts):
-                found.append(f"Groom {groom.name!r} has a root on a face that its mesh does not have.")
+                found.append(f"{owner} has a root on a face that its mesh does not have.")
             elif roots.corners.min() < 0 or np.any(roots.corners >= mesh.counts[roots.faces][:, None]):
-                found.append(f"Groom {groom.name!r} has a root on a corner that its face does not have.")
+                found.append(f"{owner} has a root on a corner that its face does not have.")
+    for groom in document.grooms:
+        mesh = find_mesh(document, groom.mesh_id).mesh
         for item in groom.maps:
             if item.values is not None and len(item.values) != len(mesh.points):
                 found.append(

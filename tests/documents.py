@@ -8,7 +8,8 @@ import numpy as np
 
 from core.camera import Camera
 from core.curve import Curve, Key
-from core.document import Document, MeshObject, with_groom
+from core.document import Document, MeshObject, with_feathers, with_groom
+from core.feather.coat.coat import AttributeValue, FeatherCoat, KeyAttributes, Placement, Proxy, Stroke, Tract
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
 from core.image.plate import Plate
@@ -86,7 +87,30 @@ def animated_document() -> Document:
         frizz=Value(base=Curve(keys=keys, before="cycle", after="linear"), map="density"),
         width_root=formula("1e-4 * (1 + rand(id, 7))", "density"), length_variation=constant(0.3),
     )
-    return matched(with_groom(document, groom.replace(coat=coat)))
+    return feathered(matched(with_groom(document, groom.replace(coat=coat))))
+
+
+def feathered(document: Document) -> Document:
+    """The document with a coat of feathers that has one of everything, its keys the guides of the first groom."""
+    groom = document.grooms[0]
+    frames, shaft = np.array([1001.0, 1010.0], np.float32), np.linspace(0.0, 0.1, 4, dtype=np.float32)
+    shafts = np.stack([np.outer(shaft, direction) for direction in ((0.0, 1.0, 0.2), (0.3, 1.0, 0.4))])
+    line = np.array([[0.1, 0.0, 0.1], [0.9, 0.0, 0.9]], np.float32)
+    coat = FeatherCoat(
+        id=1, name="plumage", mesh_id=groom.mesh_id, keys_id=groom.id,
+        placements=(
+            Placement(kind="rows", count=40, density_map="density"),
+            Placement(kind="hand", count=2, hand=groom.guides.roots.take(np.arange(2))),
+            Placement(kind="even", count=20, tract="spine"),
+        ),
+        tracts=(Tract(name="spine", line=line, width=0.3),), strokes=(Stroke(points=line),),
+        attributes=(AttributeValue(name="shaftTwist", value=formula("0.2 * sin(frame) * age")),),
+        key_attributes=KeyAttributes(
+            ids=np.array([0, 3], np.int32), names=("vaneWidthLeft",), values=np.array([[0.1], [0.2]], np.float32)),
+        proxies=(Proxy(id=3, frames=frames, shafts=shafts.astype(np.float32), rolls=np.zeros(2, np.float32)),),
+        ruffle=formula("0.1 * rand(id, 3)"), length=constant(1.1, "density"),
+    )
+    return with_feathers(document, coat)
 
 
 def matched(document: Document) -> Document:

@@ -128,6 +128,7 @@ def project_info(path: str | os.PathLike[str]) -> dict[str, Any]:
         "faces": sum(len(item.mesh.counts) for item in document.meshes),
         "controls": [name for item in document.meshes if item.rig is not None for name in control_names(item.rig)],
         "grooms": [groom.name for groom in document.grooms],
+        "feathers": [coat.name for coat in document.feathers],
         "guides": sum(len(groom.guides) for groom in document.grooms),
         "hairs": sum(_hairs(groom.coat) for groom in document.grooms),
         "bytes": os.path.getsize(path),

@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 7
+FORMAT = 8
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -60,9 +60,15 @@ def selected_tracks(raw: Raw) -> Raw:
     return raw
 
 
+def feathered_meshes(raw: Raw) -> Raw:
+    """7 -> 8: documents may hold coats of feathers; as there were none, nothing is to be changed."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
 UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {
-    1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks, 5: keyed_clips, 6: selected_tracks}
+    1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks, 5: keyed_clips, 6: selected_tracks,
+    7: feathered_meshes}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:
