@@ -77,7 +77,7 @@ def narrows_the_twist(hand: Hand, folder: Path) -> None:
     poses.list.clearSelection()
     poses.list.setCurrentItem(entry)
     poses.list.itemClicked.emit(entry, 0)
-    poses.falloffs["wrist"].enter(math.radians(40.0))
+    poses.falloffs["wrist"].bars[0].enter(math.radians(40.0))
     hand.window.pose_side.map.layer.enter("wrist")
     hand.rest()
 

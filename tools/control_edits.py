@@ -16,7 +16,7 @@ from core.errors import UserError
 from core.pose.edit_layers import refresh
 from core.pose.pose import Pose, Vector
 from core.pose.pose_space import Correctives
-from core.pose.rig import Constraint, ConstraintKind, Control, Rig
+from core.pose.rig import Constraint, ConstraintKind, Control, Rig, control_names
 from core.record import freeze
 from tools.pose_edits import hold_pose, rigged, set_constraints
 
@@ -168,6 +168,29 @@ def constrain_joint(
         "joint": joint, "kind": kind, "target": target, "weight": weight, "axis": axis})
 
 
+def edit_constraint(document: Document, mesh_id: int, at: int, **changes: Any) -> Document:
+    """The document with fields of the constraint number `at` of the rig changed: low, high, weight, axis."""
+    _, rig = rigged(document, mesh_id)
+    try:
+        made = _constraint_at(rig, at).replace(**changes)
+    except (ValueError, TypeError) as error:
+        raise UserError(f"This cannot be set: {error}.") from error
+    return _with_constraints(document, mesh_id, (*rig.constraints[:at], made, *rig.constraints[at + 1 :]))
+
+
+def remove_constraint(document: Document, mesh_id: int, at: int) -> Document:
+    """The document without the constraint number `at` of the rig."""
+    _, rig = rigged(document, mesh_id)
+    gone = _constraint_at(rig, at)
+    return set_constraints(document, mesh_id, tuple(one for one in rig.constraints if one is not gone))
+
+
+def free_control_name(rig: Rig, base: str) -> str:
+    """A name for a control that none has: `base`, or with a number after it."""
+    taken = set(control_names(rig))
+    return next(n for n in (base, *(f"{base} {i}" for i in range(2, len(taken) + 3))) if n not in taken)
+
+
 def free_joints(document: Document, mesh_id: int, joints: Sequence[str]) -> Document:
     """The document without the constraints of some joints."""
     _, rig = rigged(document, mesh_id)
@@ -180,7 +203,7 @@ def _constrained(document: Document, mesh_id: int, fields: dict[str, Any]) -> Do
 
     Where the joint cannot be led, for it carries the target, the document is refused.
     """
-    item, rig = rigged(document, mesh_id)
+    _, rig = rigged(document, mesh_id)
     try:
         one = Constraint(**fields)
     except ValueError as error:
@@ -192,8 +215,20 @@ def _constrained(document: Document, mesh_id: int, fields: dict[str, Any]) -> Do
         parent = int(rig.skeleton.parents[rig.skeleton.names.index(above)])
         above = None if parent < 0 else rig.skeleton.names[parent]
     others = [c for c in rig.constraints if (c.joint, c.kind) != (one.joint, one.kind)]
-    document = set_constraints(document, mesh_id, (*others, one))
-    return document if item.pose is None else hold_pose(document, mesh_id, item.pose)
+    return _with_constraints(document, mesh_id, (*others, one))
+
+
+def _with_constraints(document: Document, mesh_id: int, constraints: tuple[Constraint, ...]) -> Document:
+    """The document with these constraints, which a pose that is held obeys at once."""
+    pose = rigged(document, mesh_id)[0].pose
+    document = set_constraints(document, mesh_id, constraints)
+    return document if pose is None else hold_pose(document, mesh_id, pose)
+
+
+def _constraint_at(rig: Rig, at: int) -> Constraint:
+    if not 0 <= at < len(rig.constraints):
+        raise UserError(f"There is no constraint {at}; the rig has {len(rig.constraints)}.")
+    return rig.constraints[at]
 
 
 def _control(**fields: Any) -> Control:

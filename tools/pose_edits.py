@@ -68,6 +68,7 @@ def add_sculpt(
     except Refusal as refusal:
         others = [name for name in refusal.poses if name not in (pose.name, REST_NAME)]
         if twins == "refuse" or not others or refusal.reason == "coplanar":
+            refusal.sculpt = pose, surface
             raise
         if twins == "delete":
             for name in others:

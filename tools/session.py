@@ -210,7 +210,7 @@ class Session:
             self._write_journal(name)
         self._show(document)
 
-    def edit(self, name: str, function: Callable[..., Document], *args: Any, **parameters: Any) -> None:
+    def edit(self, name: str, function: Callable[..., Document], /, *args: Any, **parameters: Any) -> None:
         """Commit ``function(document, *args, **parameters)`` of the last committed document as one named step.
 
         When it raises, the document is as before.

@@ -12,6 +12,7 @@ from app.window.timeline.keys_at_hand import KeysAtHand
 from core.document import Document, MeshObject
 from core.errors import UserError
 from core.groom.groom import Groom
+from core.pose.refusal import Refusal
 from core.workspace import Workspace
 from tools.session import Session
 
@@ -25,6 +26,7 @@ class Desk(QObject):
     session_replaced : another document was opened; everything is to be read anew.
     keys : of the curves, which are selected.
     said : a sentence for the status line. failed : an error in words, with a longer text to copy (or "").
+    refused : poses cannot be told apart (a ``core.pose.refusal.Refusal``); it is said by `failed` as well.
     """
 
     changed = Signal(object, object)
@@ -33,6 +35,7 @@ class Desk(QObject):
     session_replaced = Signal()
     said = Signal(str)
     failed = Signal(str, str)
+    refused = Signal(object)
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -94,11 +97,11 @@ class Desk(QObject):
         if self.attempt(self.session.choose, tool, **params) is not FAILED:
             self.workspace_changed.emit(old, self.session.workspace)
 
-    def edit(self, step: str, function: Callable[..., Document], *args: Any, **parameters: Any) -> bool:
+    def edit(self, step: str, function: Callable[..., Document], /, *args: Any, **parameters: Any) -> bool:
         """One named step of history; False when it could not be made (the reason is said)."""
         return self.attempt(self.session.edit, step, function, *args, **parameters) is not FAILED
 
-    def attempt(self, function: Callable[..., Any], *args: Any, **parameters: Any) -> Any:
+    def attempt(self, function: Callable[..., Any], /, *args: Any, **parameters: Any) -> Any:
         """Call something that may raise a UserError; :data:`FAILED`, with the reason said, when it does."""
         try:
             return function(*args, **parameters)
@@ -109,6 +112,8 @@ class Desk(QObject):
     def error(self, error: Exception, details: str = "") -> None:
         """Say what went wrong; the details, or what the error notes beside its words, can be copied."""
         self.failed.emit(str(error), details or "\n".join(getattr(error, "__notes__", ())))
+        if isinstance(error, Refusal):
+            self.refused.emit(error)
 
     def end_stroke(self, cancel: bool = False) -> None:
         """Release (or give up) the stroke that goes on, and let panels look again."""

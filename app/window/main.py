@@ -45,6 +45,7 @@ from app.window.pictures_dialog import PicturesDialog
 from app.window.plugin_bar import PluginBar
 from app.window.pose.controls import PoseControls
 from app.window.pose.poses import PoseLibrary, PoseList
+from app.window.pose.rig_panel import RigPanel
 from app.window.pose.side import BesideView, PoseSide
 from app.window.preferences import Preferences
 from app.window.screenshot import Photographer
@@ -141,6 +142,7 @@ class MainWindow(QMainWindow):
             ("controls", Section(PANELS["controls"][0], PoseControls(self.desk), memory, "controls")),
             ("poses", Section(PANELS["poses"][0], PoseList(self.desk), memory, "poses")),
             ("library", Section(PANELS["library"][0], PoseLibrary(self.desk), memory, "library")),
+            ("rig", Section(PANELS["rig"][0], RigPanel(self.desk), memory, "rig")),
             ("respect", RespectPanel(self.desk, memory)),
             ("tracks", Section(PANELS["tracks"][0], TrackList(self.desk), memory, "tracks")),
             ("coat", CoatPanel(self.desk, memory)),

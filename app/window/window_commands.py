@@ -20,6 +20,7 @@ PANELS = {
     "controls": ("Controls", "Shows or hides the sliders of joints and dials that pose the rig."),
     "poses": ("Poses", "Shows or hides sculpted poses, their layers and how far each of them reaches."),
     "library": ("Pose library", "Shows or hides the poses that are kept by name for later."),
+    "rig": ("Rig", "Shows or hides the abstract controls and the constraints of the rig."),
     "pose_map": ("Pose map", "Shows or hides the map of pose space beside the model."),
     "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
@@ -30,8 +31,8 @@ PANELS = {
 }
 # panels that belong to one craft; the others are those of all
 PANEL_CRAFTS = {
-    "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "pose_map": "pose",
-    "tracks": "match",
+    "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "rig": "pose",
+    "pose_map": "pose", "tracks": "match",
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
 AT_FIRST_HIDDEN = ("curves",)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
+
+from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.pose.pose import Pose
 
 Reason = Literal["duplicate", "near-duplicate", "coplanar", "unsymmetric", "singular"]
 
@@ -26,7 +29,10 @@ class Refusal(UserError):
     """A pose space that cannot be solved.
 
     poses : the names of the guilty ones, in the order of the space. reason : what they did.
+    sculpt : the pose and the surface (V, 3), object space, that were to be added, so that they need not be lost.
     """
+
+    sculpt: tuple[Pose, NDArray[Any]] | None = None
 
     @property
     def offers(self) -> tuple[str, ...]:

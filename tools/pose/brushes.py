@@ -21,14 +21,13 @@ from core.pose.sculpt.ring import Ring
 from core.pose.sculpt.symmetry import reflected
 from core.posed import held_points
 from core.record import freeze
-from tools.brush import DAB, RingStroke
+from tools.brush import RingStroke
 from tools.pose.craft import Points, PoseGround
 from tools.pose_edits import pose_named
 from tools.ring import BrushParams, ring_radius, ring_strength
 from tools.tool import Hit, Pointer, Stroke, Tool, Turn
 
 RISE = 0.15  # of the radius, what one radius of way raises at full strength
-MOST_DABS = 32  # of one batch of samples
 
 
 class SculptParams(BrushParams):
@@ -58,14 +57,13 @@ class SculptStroke(RingStroke[SculptParams, PoseGround, Points]):
 
     def brush(self, points: Points) -> Points:
         """The surface after the dabs along the way."""
-        count = min(max(int(np.ceil(self.travel / DAB)), 1), MOST_DABS)
-        assert self.last is not None
-        for x, y in _along(self.way, count):
-            hit = self.ground.hit(self.last._replace(x=float(x), y=float(y)))
+        dabs = self.dabs()
+        for dab in dabs:
+            hit = self.ground.hit(dab)
             if hit is not None:
                 ring = self.ring(hit, points)
                 if len(ring.sites):
-                    points = self.dab(points, ring, self.dose / count)
+                    points = self.dab(points, ring, self.dose / len(dabs))
         return points
 
     def ring(self, hit: Hit, points: Points) -> Ring:
@@ -73,15 +71,6 @@ class SculptStroke(RingStroke[SculptParams, PoseGround, Points]):
         metres = self.radius / self.ground.pixels_per_metre(hit.point)
         at = points if points.ndim == 2 else self.ground.skin.points
         return self.ground.ring(hit, at, metres, self.params.falloff, self.masked)
-
-
-def _along(way: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """The ends (count, 2) of that many equal pieces of a way (K, 2)."""
-    if len(way) == 1:
-        return np.repeat(way, count, axis=0)
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
-    at = length[-1] * np.arange(1, count + 1) / count
-    return np.stack([np.interp(at, length, way[:, k]) for k in range(2)], axis=1)
 
 
 class Sculpt(Tool[Any]):

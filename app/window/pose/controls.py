@@ -23,6 +23,8 @@ from tools.pose_edits import hold_pose, select_joints
 
 _MESH = Field("Rig", "Which mesh with a rig the sliders, the map and the brushes of this craft work on.")
 _JOINT = Field("Joint", "The joint whose angles the sliders below turn, relative to rest.")
+_PAD = (Field("Pad across", "The dial that goes from left to right on the pad below."),
+        Field("Pad up", "The dial that goes from below to above on the pad below."))
 _ANGLES = tuple(
     Field(f"Turn {axis}", f"Turns the joint about its {axis} axis at rest, in degrees from rest.", "rad",
           (-math.pi, math.pi), (-4.0 * math.pi, 4.0 * math.pi))
@@ -39,6 +41,8 @@ class PoseControls(QWidget):
         self.angles = tuple(NumberBar(known, 0.0, 0.0) for known in _ANGLES)
         self.dials: dict[str, NumberBar] = {}
         self.pad: DialPad | None = None
+        self.axes: tuple[ChoiceBar, ...] = ()  # which dials the pad is of, where there are more than two
+        self._pairs: dict[int, tuple[str, str]] = {}  # by mesh, "" for no dial
         self._about: tuple[object, ...] = ()
         self._held: tuple[str, Pose, np.ndarray] | None = None  # joint, its pose, and angles the hand set
         column = QVBoxLayout(self)
@@ -123,14 +127,39 @@ class PoseControls(QWidget):
             self.joint.set_value(_first_joint(item, rig))
         self._clear_dials()
         dials = [control for control in rig.controls if control.kind == "number"]
-        if len(dials) == 2:
-            self.pad = DialPad(dials[0], dials[1])
-            self.pad.moved.connect(self._padded)
-            self._dial_rows.addWidget(self.pad)
+        if len(dials) > 1:
+            self._build_pad(item, rig, dials)
         for control in dials:
             bar = self.dials[control.name] = NumberBar(_dial(control), control.rest, control.rest)
             bar.edited.connect(lambda value, final, name=control.name: self._dialled(name, value, final))
             self._dial_rows.addWidget(Row(control.name, bar))
+
+    def _build_pad(self, item: MeshObject, rig: Rig, dials: list[Control]) -> None:
+        """A pad of two dials; of more than two the hand chooses which, once for each mesh."""
+        by_name = {control.name: control for control in dials}
+        pair = self._pairs.get(item.id, ())
+        if len(pair) != 2 or not set(pair) <= by_name.keys() | {""}:
+            pair = self._pairs[item.id] = _pair_at_first(item, rig, dials)
+        if len(dials) > 2:
+            names = ("", *by_name)
+            for at, known in enumerate(_PAD):
+                bar = ChoiceBar(known, pair[at], None, names, ("none", *by_name))
+                bar.edited.connect(lambda name, final, at=at: final and self._pair_chosen(item.id, at, name))
+                self.axes = (*self.axes, bar)
+                self._dial_rows.addWidget(Row(known.label, bar))
+        if "" not in pair and pair[0] != pair[1]:
+            self.pad = DialPad(by_name[pair[0]], by_name[pair[1]])
+            self.pad.moved.connect(self._padded)
+            self._dial_rows.addWidget(self.pad)
+
+    def _pair_chosen(self, mesh_id: int, at: int, name: str) -> None:
+        """Another dial goes along an axis of the pad; the one that went there takes the place of a twin."""
+        pair, old = list(self._pairs[mesh_id]), self._pairs[mesh_id][at]
+        pair[at] = name
+        if name and pair[1 - at] == name:
+            pair[1 - at] = old
+        self._pairs[mesh_id], self._about = (pair[0], pair[1]), ()
+        self.refresh()
 
     def _clear_dials(self) -> None:
         while (entry := self._dial_rows.takeAt(0)) is not None:
@@ -138,7 +167,7 @@ class PoseControls(QWidget):
             if widget is not None:
                 widget.hide()
                 widget.deleteLater()
-        self.dials, self.pad = {}, None
+        self.dials, self.pad, self.axes = {}, None, ()
 
     def _show(self, rig: Rig) -> None:
         pose, joint = self.pose(), self.joint.value()
@@ -151,7 +180,7 @@ class PoseControls(QWidget):
         else:
             angles = euler_from_quaternion(np.array(turn))
         for bar, angle in zip(self.angles, angles, strict=True):
-            bar.set_value(float(angle))
+            bar.set_value(float(angle) if abs(angle) > 1e-9 else 0.0)
         still = not rig.skeleton.names or (bool(self.dials) and len(rig.skeleton.names) == 1)
         for field in (self.joint, *self.angles):  # a lone root beside dials is nothing to pose by
             self.rows[field].setVisible(not still)
@@ -163,10 +192,12 @@ class PoseControls(QWidget):
 
     def _on_pad(self) -> tuple[Pose, ...]:
         """The sculpts that only the two dials of the pad are about."""
-        item = self.desk.posed
+        item, pad = self.desk.posed, self.pad
+        if pad is None:
+            return ()
         layers = () if item is None or item.correctives is None else item.correctives.layers
         return tuple(s.pose for layer in layers for s in layer.space.samples
-                     if set(moved_controls(s.pose)) <= self.dials.keys())
+                     if set(moved_controls(s.pose)) <= {pad.across.name, pad.up.name})
 
     def _padded(self, x: float, y: float, final: bool) -> None:
         pad, pose = self.pad, self.pose()
@@ -220,6 +251,20 @@ def _first_joint(item: MeshObject, rig: Rig) -> str:
                 return dof.control
     return next((n for n, p in zip(rig.skeleton.names, rig.skeleton.parents, strict=True) if p >= 0),
                 rig.skeleton.names[0])
+
+
+def _pair_at_first(item: MeshObject, rig: Rig, dials: list[Control]) -> tuple[str, str]:
+    """The two dials a sculpt reads together, else the first two that are no shapes of the file, else none of many."""
+    names = [control.name for control in dials]
+    if len(names) == 2:
+        return names[0], names[1]
+    for layer in () if item.correctives is None else item.correctives.layers:
+        read = [name for name in names if name in layer.space.controls]
+        if len(read) > 1:
+            return read[0], read[1]
+    shapes = () if rig.shapes is None else rig.shapes.names
+    own = [name for name in names if name not in shapes]
+    return (own[0], own[1]) if len(own) > 1 else ("", "")
 
 
 def _dial(control: Control) -> Field:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import get_args
 
-from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QGridLayout,
     QInputDialog,
     QLabel,
     QPushButton,
-    QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
     QWidget,
@@ -20,17 +18,18 @@ from PySide6.QtWidgets import (
 
 from app.window.desk import Desk
 from app.window.fields.choice_bar import ChoiceBar
-from app.window.fields.number_bar import NumberBar
 from app.window.params_panel import RecordForm
+from app.window.pose.names import Names
+from app.window.pose.reach import Reach
+from app.window.pose.refused import RefusedBar
 from app.window.pose.views import ONLY_SKIN
 from app.window.sections import Row
-from app.window.theme import look_of
 from core.document import Document
 from core.errors import UserError
 from core.field import Field, fields_of
 from core.pose.compare import LABELS, METHODS, Method
 from core.pose.pose import REST, Pose
-from core.pose.pose_space import Dof, PoseLayer, PoseSample, PoseSpace
+from core.pose.pose_space import Dof, Falloff, PoseLayer, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
 from core.pose.synthesis import pose_at
 from core.workspace import Workspace
@@ -45,34 +44,15 @@ READINGS: tuple[pose_edits.Reading, ...] = get_args(pose_edits.Reading)
 _ROLE = Qt.ItemDataRole.UserRole
 
 
-class _Names(QTreeWidget):
-    """A list as high as what is in it, up to twelve rows."""
-
-    def __init__(self, what: str) -> None:
-        super().__init__()
-        self.setHeaderHidden(True)
-        self.setRootIsDecorated(False)
-        self.setIndentation(look_of().gap + 4)
-        self.setSelectionMode(QTreeWidget.SelectionMode.ExtendedSelection)
-        self.setAccessibleName(what)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-
-    def sizeHint(self) -> QSize:
-        rows = sum(1 + self.topLevelItem(i).childCount() for i in range(self.topLevelItemCount()))
-        return QSize(180, min(max(rows, 1), 12) * (look_of().row + 1) + 4)
-
-    minimumSizeHint = sizeHint
-
-
 class PoseList(QWidget):
     """Layers and their poses: a click holds a pose; its falloffs are the bars below."""
 
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.desk = desk
-        self.list = _Names("Sculpted poses")
+        self.list = Names("Sculpted poses")
         self.way = ChoiceBar(_WAY, "pose-space", "pose-space", METHODS, tuple(LABELS[way] for way in METHODS))
-        self.falloffs: dict[str, NumberBar] = {}
+        self.falloffs: dict[str, Reach] = {}
         self.settings: RecordForm | None = None  # of the layer that is chosen
         self.readings: dict[str, ChoiceBar] = {}
         self.said = QLabel()
@@ -81,7 +61,9 @@ class PoseList(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
+        self.refused = RefusedBar(desk)
         column.addWidget(self.said)
+        column.addWidget(self.refused)
         column.addWidget(self.list)
         self._reach = QVBoxLayout()
         self._reach.setSpacing(4)
@@ -113,6 +95,7 @@ class PoseList(QWidget):
         desk.workspace_changed.connect(self._workspace_changed)
         desk.session_replaced.connect(self.refresh)
         desk.stroke_ended.connect(self.refresh)
+        desk.refused.connect(self._offer)
         self.refresh()
 
     @property
@@ -192,11 +175,9 @@ class PoseList(QWidget):
         found = self._sample(chosen[0]) if len(chosen) == 1 else None
         for dof in () if found is None else found[0].space.dofs:
             assert found is not None
-            reach = found[1].falloffs.get(dof.control, dof.falloff)[0]
-            bar = NumberBar(_falloff_field(dof), reach, dof.falloff[0], self.desk.document.unit)
-            bar.edited.connect(lambda value, final, dof=dof: final and self._reached(dof, value))
-            self.falloffs[dof.control] = bar
-            self._reach.addWidget(Row(f"Reach {dof.control}", bar))
+            reach = self.falloffs[dof.control] = Reach(found[1], dof, self.desk.document.unit)
+            reach.edited.connect(lambda falloff, dof=dof: self._reached(dof, falloff))
+            self._reach.addWidget(reach)
         item = self.desk.posed
         self.buttons["add"].setEnabled(item is not None)
         for name, enough in (("move", len(chosen) == 1), ("merge", len(chosen) > 1), ("delete", bool(chosen))):
@@ -226,9 +207,9 @@ class PoseList(QWidget):
         if changes:
             self._edit("Layer settings", pose_edits.set_space, layer.name, **changes)
 
-    def _reached(self, dof: Dof, value: float) -> None:
+    def _reached(self, dof: Dof, falloff: Falloff) -> None:
         if len(self.chosen) == 1:
-            self._edit("Falloff", pose_edits.set_falloff, self.chosen[0], dof.control, (float(value),))
+            self._edit("Falloff", pose_edits.set_falloff, self.chosen[0], dof.control, falloff)
 
     def _add(self) -> None:
         item = self.desk.posed
@@ -275,25 +256,18 @@ class PoseList(QWidget):
     def _edit(self, step: str, function: Callable[..., Document], *args: object, **parameters: object) -> None:
         item = self.desk.posed
         if item is not None:
-            try:
-                self.desk.session.edit(step, function, item.id, *args, **parameters)
-            except UserError as error:
-                self.desk.error(error)
-                refused = error.poses if isinstance(error, Refusal) else ()
-            else:
-                refused = ()
+            self.desk.edit(step, function, item.id, *args, **parameters)
             self._seen = None  # what was refused goes back to what it was
             self.refresh()
-            if refused:
-                self._offer(refused)
 
-    def _offer(self, names: tuple[str, ...]) -> None:
+    def _offer(self, refusal: Refusal) -> None:
         """Choose the poses that a refusal names, so that they can be merged, deleted or moved at once."""
+        self.refused.offer(refusal)
         self.list.clearSelection()
         for row in range(self.list.topLevelItemCount()):
             top = self.list.topLevelItem(row)
             for entry in (top.child(k) for k in range(top.childCount())):
-                entry.setSelected(entry.data(0, _ROLE) in names)
+                entry.setSelected(entry.data(0, _ROLE) in refusal.poses)
 
     # -- what changes ------------------------------------------------------------------------------------
 
@@ -320,7 +294,7 @@ class PoseLibrary(QWidget):
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.desk = desk
-        self.list = _Names("Poses of the library")
+        self.list = Names("Poses of the library")
         self.said = QLabel("No poses kept yet. Keep the pose you hold under a name, to come back to it later.")
         self.said.setWordWrap(True)
         self.said.setEnabled(False)
@@ -395,12 +369,3 @@ def _button(words: str, tooltip: str, run: Callable[[], object]) -> QPushButton:
     button.setToolTip(tooltip)
     button.clicked.connect(lambda: run())
     return button
-
-
-def _falloff_field(dof: Dof) -> Field:
-    words = f"How far this sculpt is felt along {dof.control}: at this distance from its pose it has faded by e."
-    if dof.kind == "number":
-        return Field("Reach", words, soft=(0.05, max(4.0 * dof.falloff[0], 1.0)), hard=(1e-6, 1e6))
-    if dof.kind == "translation":
-        return Field("Reach", words, "m", (0.001, 1.0), (1e-6, 1e6))
-    return Field("Reach", words, "rad", (math.radians(5), math.pi), (1e-6, 4.0 * math.pi))

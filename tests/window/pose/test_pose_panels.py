@@ -14,18 +14,22 @@ from app.window.pose import map_panel as pose_map_panel
 from app.window.pose.controls import PoseControls
 from app.window.pose.overlay import skeleton_of
 from app.window.pose.poses import PoseLibrary, PoseList
+from app.window.pose.rig_panel import RigPanel
 from core.demo.pose_document import pose_document
-from core.document import Document
+from core.document import Document, find_mesh, with_mesh
 from core.overlay import Circle
 from core.pose.compare import LABELS
 from core.pose.edit_layers import cross_talk
 from core.pose.pose import REST
-from core.pose.rotation import quaternion_from_euler
+from core.pose.rotation import euler_from_quaternion, quaternion_from_euler
 from core.pose.synthesis import evaluate
 from core.posed import shown_points
+from core.record import freeze
+from docs.first_pose import elbow_on_screen
 from tests.window.conftest import Opened
 from tests.window.hand import Hand
-from tools.pose_edits import hold_pose
+from tools import control_edits
+from tools.pose_edits import hold_pose, select_joints, set_reading
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -131,8 +135,8 @@ def test_the_list_has_the_layers_and_holds_a_pose(posing: Hand) -> None:
     poses.list.setCurrentItem(top[2].child(0))
     poses.list.itemClicked.emit(top[2].child(0), 0)
     assert list(desk.document.meshes[0].pose.rotations) == ["wrist"]
-    assert poses.falloffs["wrist"].value() > 0.0
-    poses.falloffs["wrist"].enter(0.5)
+    assert poses.falloffs["wrist"].value()[0] > 0.0
+    poses.falloffs["wrist"].bars[0].enter(0.5)
     layer = desk.document.meshes[0].correctives.layers[2]
     assert layer.space.samples[0].falloffs["wrist"] == (0.5,)
     top = poses.list.topLevelItem(0)
@@ -367,3 +371,106 @@ def picture_values(hand: Hand) -> np.ndarray:
 def drawn(hand: Hand) -> None:
     """Wait until jobs have ended and what they caused is on the screen; nothing needs to be finished for that."""
     hand.until(lambda: not hand.window.desk.jobs.running and not hand.view.pending)
+
+
+def test_a_pad_is_of_two_of_three_dials_that_the_hand_chooses(posing: Hand) -> None:
+    desk, controls = posing.window.desk, part(posing, PoseControls)
+    desk.set_workspace(mesh=2)
+    assert controls.axes == ()
+    desk.edit("Add dial", control_edits.add_dial, 2, "wonder", -1.0, 1.0)
+    across, up = controls.axes
+    assert (across.value(), up.value()) == ("valence", "arousal"), "those that sculpts read"
+    up.enter("wonder")
+    pad = controls.pad
+    assert (pad.across.name, pad.up.name) == ("valence", "wonder")
+    assert pad.poses == (), "no sculpt is about these two"
+    QTest.mouseClick(pad, LEFT, pos=pad.to_pixel(0.5, -0.5).toPoint())
+    numbers = desk.posed.pose.numbers
+    assert [numbers["valence"], numbers["wonder"]] == pytest.approx([0.5, -0.5], abs=0.02)
+    controls.axes[0].enter("wonder")
+    assert (controls.pad.across.name, controls.pad.up.name) == ("wonder", "valence"), "they change places"
+
+
+def test_a_sculpt_reaches_differently_along_each_axis(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    poses.list.topLevelItem(0).child(0).setSelected(True)
+    (name,) = poses.chosen
+    reach = next(iter(poses.falloffs.values()))
+    reach.each.enter(True)
+    reach = poses.falloffs["elbow"]
+    assert len(reach.bars) == 3
+    reach.bars[2].enter(0.25)
+    sample = desk.posed.correctives.layers[0].space.samples[0]
+    assert sample.name == name
+    assert sample.falloffs["elbow"][2] == 0.25
+    assert sample.falloffs["elbow"][0] == sample.falloffs["elbow"][1] != 0.25
+    poses.falloffs["elbow"].each.enter(False)
+    assert len(desk.posed.correctives.layers[0].space.samples[0].falloffs["elbow"]) == 1
+
+
+def test_controls_are_made_changed_and_deleted_in_the_panel_of_the_rig(posing: Hand) -> None:
+    desk, panel = posing.window.desk, part(posing, RigPanel).controls
+    said: list[str] = []
+    desk.failed.connect(lambda words, details: said.append(words))
+    QTest.mouseClick(panel.buttons["dial"], LEFT)
+    assert panel.chosen == "dial"
+    panel.form.fields["high"].enter(3.0)
+    panel.form.fields["name"].enter("strain")
+    (control,) = desk.posed.rig.controls
+    assert (control.name, control.low, control.high) == ("strain", 0.0, 3.0)
+    panel.form.fields["high"].enter(-1.0)
+    posing.until(lambda: panel.form is not None and panel.form.fields["high"].value() == 3.0)
+    assert "within a range" in said[-1]
+    QTest.mouseClick(panel.buttons["geometry"], LEFT)
+    assert "mask" in said[-1]
+    mask = np.zeros(len(desk.posed.mesh.points), np.float32)
+    mask[:9] = 1.0
+    desk.edit("Mask", lambda d, i: with_mesh(d, find_mesh(d, i).replace(mask=freeze(mask))), 1)
+    QTest.mouseClick(panel.buttons["geometry"], LEFT)
+    assert list(desk.posed.rig.controls[1].vertices) == list(range(9))
+    panel.form.fields["travel"].enter(0.05)
+    assert desk.posed.rig.controls[1].travel == 0.05
+    QTest.mouseClick(panel.buttons["delete"], LEFT)
+    assert [c.name for c in desk.posed.rig.controls] == ["strain"]
+    assert desk.session.history.undo_name == "Delete control"
+
+
+def test_constraints_are_made_changed_and_deleted_in_the_panel_of_the_rig(posing: Hand) -> None:
+    desk, panel = posing.window.desk, part(posing, RigPanel).constraints
+    desk.edit("Select joint", select_joints, 1, ("elbow",))
+    QTest.mouseClick(panel.buttons["limit"], LEFT)
+    panel.list.topLevelItem(0).setSelected(True)
+    panel.form.fields["high_z"].enter(0.4)
+    (limit,) = desk.posed.rig.constraints
+    assert limit.high == pytest.approx((math.pi / 4, math.pi / 4, 0.4))
+    controls = part(posing, PoseControls)
+    controls.angles[2].enter(1.2)
+    assert desk.posed.pose.rotations["elbow"] == pytest.approx(
+        quaternion_from_euler((0, 0, math.degrees(0.4))), abs=1e-6)
+    panel.form.fields["high_z"].enter(0.2)
+    assert desk.posed.pose.rotations["elbow"] == pytest.approx(
+        quaternion_from_euler((0, 0, math.degrees(0.2))), abs=1e-6), "a pose that is held obeys at once"
+    QTest.mouseClick(panel.buttons["delete"], LEFT)
+    assert desk.posed.rig.constraints == ()
+
+
+def test_a_stroke_that_is_refused_can_still_be_merged(posing: Hand) -> None:
+    desk, poses = posing.window.desk, part(posing, PoseList)
+    bent = desk.posed.correctives.layers[0].space.samples[0].pose
+    angles = np.degrees(euler_from_quaternion(np.array(bent.rotations["elbow"])))
+    desk.edit("Reading", set_reading, 1, desk.posed.correctives.layers[0].name, "elbow", "z")
+    near = {"elbow": tuple(map(float, quaternion_from_euler((20.0, 0.0, angles[2]))))}
+    desk.edit("Pose", hold_pose, 1, bent.replace(name="near", rotations=near))
+    posing.rest()
+    points = shown_points(desk.posed, 1001.0, desk.session.evaluator)
+    x, y = elbow_on_screen(posing)
+    posing.drag((x, y), (x - 0.01, y + 0.045))
+    assert poses.refused.isVisible()
+    assert bent.name in poses.chosen
+    assert desk.session.history.undo_name == "Pose", "nothing was changed yet"
+    QTest.mouseClick(poses.refused.buttons["merge"], LEFT)
+    assert not poses.refused.isVisible()
+    item = desk.posed
+    after = evaluate(item.mesh.points, item.rig, item.correctives, bent)
+    assert np.abs(after - points).max() > 1e-3
+    assert len(item.correctives.layers[0].space.samples) == 1
