@@ -24,6 +24,7 @@ A = TypeVar("A", bound=ReachParams)
 G = TypeVar("G", bound=Ground)
 V = TypeVar("V")
 DAB = 0.25  # what a press alone does, as much as this way in radii
+MOST_DABS = 32  # of one batch of samples
 
 
 class RingStroke(Generic[R, G, V]):
@@ -64,6 +65,17 @@ class RingStroke(Generic[R, G, V]):
         if len(self.way) == 1:
             return DAB
         return float(np.linalg.norm(np.diff(self.way, axis=0), axis=1).sum()) / max(self.radius, 1e-9)
+
+    def dabs(self) -> list[Pointer]:
+        """The way in equal pieces, at most a quarter of a radius each: pointers at their ends, one at press."""
+        assert self.last is not None
+        count = min(max(int(np.ceil(self.travel / DAB)), 1), MOST_DABS)
+        if len(self.way) == 1:
+            return [self.last] * count
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.way, axis=0), axis=1))])
+        at = length[-1] * np.arange(1, count + 1) / count
+        places = (np.interp(at, length, self.way[:, k]).tolist() for k in range(2))
+        return [self.last._replace(x=x, y=y) for x, y in zip(*places, strict=True)]
 
     @property
     def dose(self) -> float:

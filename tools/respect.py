@@ -11,7 +11,7 @@ from core.groom.guides import Guides
 from core.workspace import Respect
 
 # what an edit changes; of the other things it is spared what is not respected
-Edits = Literal["shape", "hold", "selection", "nothing"]
+Edits = Literal["shape", "hold", "selection", "map", "nothing"]
 
 
 def respected(guides: Guides, respect: Respect, edits: Edits) -> Guides:

@@ -1,4 +1,5 @@
-"""The craft of grooming: strokes change guides, in the pose shown, on both sides, and heed what is to be respected."""
+"""The craft of grooming: strokes change guides or maps, in the pose shown, on both sides, and heed what is to be
+respected."""
 
 from __future__ import annotations
 
@@ -21,6 +22,7 @@ from core.mesh.distance_field import DistanceField
 from core.posed import field_at, field_known, skin_at
 from core.transform import normalized
 from core.workspace import Respect
+from tools.map_edits import map_to_paint, paint_map
 from tools.posed_guides import BackToRest, in_pose
 from tools.respect import Edits, respected, restored
 from tools.screen import Screen
@@ -138,7 +140,7 @@ class GroomCraft:
     name = "groom"
     label = "Groom"
     first = "comb"
-    edits = ("shape", "hold", "selection", "nothing")
+    edits = ("shape", "hold", "selection", "map", "nothing")
 
     def __init__(self) -> None:
         self._known: tuple[tuple[Any, ...], tuple[GroomGround, ...]] | None = None
@@ -172,12 +174,14 @@ class GroomCraft:
         self._known = (key, grounds)
         return grounds
 
-    def matter(self, tool: Tool[Any], ground: GroomGround) -> Guides:
-        """The guides at press."""
-        return ground.guides
+    def matter(self, tool: Tool[Any], ground: GroomGround) -> Guides | NDArray[np.float32]:
+        """The guides at press, or the values (V,) of the map that the tool paints."""
+        return map_to_paint(ground.groom, ground.item, tool.params.map) if tool.edits == "map" else ground.guides
 
-    def document(self, document: Document, tool: Tool[Any], ground: GroomGround, matter: Guides) -> Document:
-        """The document with these guides, at rest, in place of those at press."""
+    def document(self, document: Document, tool: Tool[Any], ground: GroomGround, matter: Any) -> Document:
+        """The document with these guides, at rest, or this map in place of what was at press."""
+        if tool.edits == "map":
+            return paint_map(document, ground.groom.id, matter, tool.params.map)
         if matter is ground.guides:
             return document
         guides = matter if tool.at_rest or ground.skin is ground.rest else ground.back(matter)
