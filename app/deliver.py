@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from core.camera import frame_points
+from core.camera import Camera, frame_points
 from core.document import Document, find_mesh, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats import curve_file
 from core.formats.project import write_project
+from core.gate import seen_through
 from core.groom.children import Children
 from core.groom.export import groom_strands
 from core.groom.flow import nose_vertex
@@ -21,6 +22,7 @@ from core.groom.groom import Groom
 from core.groom.strands import GroomStrands
 from core.mesh.skin import Skin, skin_at_rest, skin_posed
 from core.posed import points_at
+from core.workspace import Workspace
 
 if TYPE_CHECKING:
     from viewport.scene import Scene
@@ -30,6 +32,26 @@ VIEWS = {
     "three-quarter": (-0.85, -0.35, -1.0), "front": (0.0, -0.08, -1.0), "back": (0.0, -0.08, 1.0),
     "left": (-1.0, -0.08, 0.0), "right": (1.0, -0.08, 0.0), "top": (0.0, -1.0, -0.02),
 }
+
+
+SAVED = "saved"  # the view as a project was left
+SIZE = (1600, 1000)
+
+
+def saved_view(workspace: Workspace, size: tuple[int, int] | None) -> tuple[Camera, tuple[int, int]] | None:
+    """The camera a project was left with and the size of its picture: of what its film gate takes, where it is shown.
+
+    size : asked for; the whole gate lies within it. None for one as wide as usual, of the aspect of the gate.
+    """
+    if not workspace.cameras:
+        return None
+    camera, gate = workspace.cameras[0], workspace.view.gate if workspace.view.gate_shown else None
+    if gate is None:
+        return camera, size or SIZE
+    if size is None:
+        size = SIZE[0], max(round(SIZE[0] / gate.aspect), 1)
+    taller = max(1.0, gate.aspect * size[1] / size[0])
+    return seen_through(gate.replace(height=gate.height * taller), camera), size
 
 
 def check_outputs(outputs: list[Path], png: Path | None) -> None:
@@ -81,15 +103,16 @@ def posed_document(document: Document, frame: float | None, evaluator: Evaluator
 
 def draw(
     path: Path, document: Document, children: Mapping[int, Children], evaluator: Evaluator,
-    size: tuple[int, int] = (1600, 1000), view: str = "three-quarter", skins: Mapping[int, Skin] | None = None,
+    size: tuple[int, int] = SIZE, view: str = "three-quarter", skins: Mapping[int, Skin] | None = None,
+    camera: Camera | None = None,
 ) -> None:
-    """Draw the document's meshes and coats into a PNG, at rest or in the pose of `skins`."""
+    """Draw the document's meshes and coats into a PNG, at rest or in the pose of `skins`, from a side or a camera."""
     from viewport.document_scene import scene_of  # GL is loaded only when a picture is asked for
 
     shown = posed_document(document, None, evaluator) if skins is None else skins
     first = next(iter(shown.values()), None)
     direction = VIEWS[view] if first is None else turned_view(VIEWS[view], first)
-    _picture(path, scene_of(document, shown, children), size, direction)
+    _picture(path, scene_of(document, shown, children), size, direction, camera)
 
 
 def turned_view(view: tuple[float, float, float], skin: Skin) -> tuple[float, float, float]:
@@ -110,10 +133,12 @@ def draw_strands(path: Path, groom: GroomStrands, size: tuple[int, int], view: s
     _picture(path, scene_of_strands(groom), size, VIEWS[view])
 
 
-def _picture(path: Path, scene: Scene, size: tuple[int, int], view: tuple[float, float, float]) -> None:
+def _picture(
+    path: Path, scene: Scene, size: tuple[int, int], view: tuple[float, float, float], camera: Camera | None = None,
+) -> None:
     from viewport.picture import render_png
     from viewport.scene import all_points
 
     clouds = [points for points in all_points(scene) if len(points)]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3), np.float32)
-    render_png(path, scene, frame_points(points, view, size[0] / size[1]), size)
+    render_png(path, scene, camera or frame_points(points, view, size[0] / size[1]), size)

@@ -11,7 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from app.deliver import deliver, draw, draw_strands, exported_groom, posed_document
+from app.deliver import (
+    SAVED,
+    SIZE,
+    VIEWS,
+    deliver,
+    draw,
+    draw_strands,
+    exported_groom,
+    posed_document,
+    saved_view,
+)
 from core.document import Document, MeshObject, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
@@ -81,15 +91,27 @@ def convert(source: Path, target: Path, unit: str | None, up: str | None, say: S
 
 
 def draw_file(
-    path: Path, png: Path, size: tuple[int, int], view: str, frame: float | None, say: Say, unit: str | None = None,
-    up: str | None = None,
+    path: Path, png: Path, size: tuple[int, int] | None, view: str | None, frame: float | None, say: Say,
+    unit: str | None = None, up: str | None = None,
 ) -> None:
-    """Draw whatever `path` holds into `png`."""
+    """Draw whatever `path` holds into `png`.
+
+    Without a view a project with a film gate is drawn as that takes it; without a size in its aspect.
+    """
     _must_exist(path)
-    evaluator = Evaluator()
+    evaluator, camera = Evaluator(), None
     if path.suffix.lower() in PROJECT:
-        document = project.read_project(path).document
-    else:
+        document, workspace = project.read_project(path)
+        gated = workspace.view.gate is not None and workspace.view.gate_shown
+        if view == SAVED or (view is None and gated):
+            saved = saved_view(workspace, size)
+            if saved is None and view == SAVED:
+                raise UserError(f"{path.name} was never looked at in the window: choose one of {', '.join(VIEWS)}.")
+            camera, size = saved or (None, size)
+    elif view == SAVED:
+        raise UserError(f"{path.name} holds no view; only a project does.")
+    size, view = size or SIZE, "three-quarter" if view in (None, SAVED) else view
+    if path.suffix.lower() not in PROJECT:
         curves = _curves(path, unit, up)
         if curves is not None:
             draw_strands(png, curves.groom, size, view)
@@ -105,7 +127,7 @@ def draw_file(
         g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id], frame=now)
         for g in visible_grooms(document)
     }
-    draw(png, document, children, evaluator, size, view, skins=skins)
+    draw(png, document, children, evaluator, size, view, skins=skins, camera=camera)
 
 
 def _rig_beside_hair(path: Path) -> dict[str, Any]:
