@@ -17,7 +17,7 @@ from core.match.solve.bundle import POSE, Free, adjust
 from core.match.solve.constraints import HARD, Constraint, Pull, circle_of
 from core.match.solve.coordinates import Frame, Similarity, onto, to_frame
 from core.match.solve.solve import Options, solve
-from core.match.solve.state import FOCAL, FRAME_FOCAL, Array, Flags, State, residuals
+from core.match.solve.state import FOCAL, FRAME_FOCAL, Array, Flags, State, residuals, start_lens
 from core.match.solve.views import as_one, guessed, ties
 
 LOOSE = (1e-2, 1e-3)  # of the size of the scene: how hard constraints are brought in where nothing is solved yet
@@ -90,17 +90,12 @@ def _from_records(model: Photomodel, table: Table, focal: float) -> Begun:
     for row, point in enumerate(model.points):
         if point.place is not None:
             points[row], held[row] = point.place, True
-    lens = _lens(model, table, focal)
+    lens = start_lens(focal, *table.views.cameras[0].size)
     state = State(
         np.array([photo.rotation for photo in model.photos]), np.array([photo.translation for photo in model.photos]),
         points, np.zeros(len(model.photos)), lens,
     )
     return table._replace(observations=observations), pixel, state, np.ones(len(model.photos), bool), held
-
-
-def _lens(model: Photomodel, table: Table, focal: float) -> Array:
-    width, height = table.views.cameras[0].size
-    return np.array([np.log(focal), 0.0, 0.0, 0.0, 0.5 * (width - 1), 0.5 * (height - 1)])
 
 
 def _from_picks(model: Photomodel, table: Table) -> Begun:
@@ -118,7 +113,7 @@ def _from_picks(model: Photomodel, table: Table) -> Begun:
     views = table.views._replace(cameras=(main._replace(focal=focal), *table.views.cameras[1:]))
     observations, pixel = as_one(table.observations, views, focal)
     state = found.state._replace(
-        lens=_lens(model, table, focal), focal=np.where(found.known, np.log(own / pixel / focal), 0.0)
+        lens=start_lens(focal, *main.size), focal=np.where(found.known, np.log(own / pixel / focal), 0.0)
     )
     points = np.zeros((table.tracks, 3))
     points[: table.points] = state.points[: table.points]
