@@ -103,7 +103,7 @@ FORM_ROWS: tuple[Row, ...] = (
     ("down", "downHairTaperVane*", 0.7, "", 0.0, 1.0, "How much thinner a down hair is at its tip"),
     ("down", "downHairFringeVane*", 22.0, "", 0.0, 120.0, "Number of fine barbules on each side of a down hair"),
     ("down", "downHairFringeLengthVane*", 0.014, "", 0.0, 0.2, "Length of the fine barbules of a down hair"),
-    ("down", "downHairDroopVane*", 0.1, "", -1.0, 1.0, "How far down hairs hang back towards the skin, in their length"),
+    ("down", "downHairDroopVane*", 0.1, "", -1.0, 1.0, "How far down hairs hang towards the skin, in their length"),
     ("down", "afterfeatherLength", 0.0, "", 0.0, 1.0, "Length of the second, downy feather below the first"),
     ("down", "afterfeatherWidth", 0.12, "", 0.0, 1.0, "Length of the hairs of the afterfeather"),
     ("down", "afterfeatherHairs", 80.0, "", 0.0, 1000.0, "Number of hairs of the afterfeather"),

@@ -151,7 +151,7 @@ def root_of_edge(a, side, edge, width, tip_inset):  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def flat_to_feather(a, table, side, width, x, y):  # type: ignore[no-untyped-def]
-    """The point of the feather, in shaft lengths, for `x` >= 0 away from the shaft and `y` along it in the flat vane."""
+    """The point of the feather, in shaft lengths, `x` >= 0 away from the shaft and `y` along it in the flat vane."""
     u = share_of_edge(a, side, y)
     wide = max(width, 1e-6)
     s = x / wide

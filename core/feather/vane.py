@@ -38,7 +38,7 @@ def vane_grids(
     Parameters
     ----------
     values : (n, k) float32, k at least ``len(SHAPE_NAMES)``: the attributes that shape a feather, in the columns of
-        ``SHAPE_COLUMNS`` (the first ones of every table of attributes). For shapes of length 1 set ``shaftLength`` to 1.
+        ``SHAPE_COLUMNS`` (the first of every table of attributes). For shapes of length 1 set ``shaftLength`` to 1.
     rows : at least 3; the first one is the root in the skin, the last one the tip, where all columns meet; between
         they lie closer towards both ends.
     columns : odd, at least 3, from the left edge over the shaft to the right edge; along a row lies the way of a barb.
