@@ -18,7 +18,6 @@ from core.match.solve.constraints import Pull
 from core.match.solve.state import (
     FRAME_COLUMNS,
     FRAME_FOCAL,
-    LENS_COLUMNS,
     Array,
     Observations,
     Rows,
@@ -75,11 +74,12 @@ class Adjusted(NamedTuple):
 def normal_equations(state: State, observations: Observations, scale: float, free: Free) -> Normal:
     """The blocks at a state; `scale` is that of the Cauchy loss in standard deviations, 0 for squares."""
     frames, points, count = len(state.rotation), len(state.points), len(observations.frame)
+    lens = len(state.lens)
     blocks = (
         np.zeros((frames, FRAME_COLUMNS, FRAME_COLUMNS)), np.zeros((frames, FRAME_COLUMNS)),
         np.zeros((count, FRAME_COLUMNS, 3)), np.zeros((points, 3, 3)), np.zeros((points, 3)),
-        np.zeros((LENS_COLUMNS, LENS_COLUMNS)), np.zeros(LENS_COLUMNS),
-        np.zeros((frames, FRAME_COLUMNS, LENS_COLUMNS)), np.zeros((points, 3, LENS_COLUMNS)),
+        np.zeros((lens, lens)), np.zeros(lens),
+        np.zeros((frames, FRAME_COLUMNS, lens)), np.zeros((points, 3, lens)),
     )
     right_of_frames, of_points, right_of_points = blocks[1], blocks[3], blocks[4]
     cost = accumulate(
@@ -128,7 +128,7 @@ def adjust(
 
 
 class Step(NamedTuple):
-    """frames (F, 7), points (P, 3), lens (6,)."""
+    """frames (F, 7), points (P, 3), lens (L,)."""
 
     frames: Array
     points: Array
@@ -266,7 +266,7 @@ def _step(normal: Normal, observations: Observations, free: Free, damping: float
             return None
     rest = system.right_out - (system.across @ kept).reshape(system.right_out.shape)
     eliminated = np.einsum("mji,mj->mi", system.roots, rest)
-    step = Step(np.zeros_like(normal.frames_right), np.zeros_like(normal.points_right), np.zeros(LENS_COLUMNS))
+    step = Step(*(np.zeros_like(right) for right in (normal.frames_right, normal.points_right, normal.lens_right)))
     step.lens[list(free.lens)] = kept[: len(free.lens)]
     tail = kept[len(free.lens) :]
     if not system.frames_out:

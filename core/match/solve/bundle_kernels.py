@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, types
+
+from core.match.lens_kernels import pixel_of
 
 F1 = types.Array(types.float64, 1, "C", readonly=True)
 F2 = types.Array(types.float64, 2, "C", readonly=True)
@@ -28,52 +31,43 @@ def accumulate(  # type: ignore[no-untyped-def]
     """Add every observation to the blocks of the normal equations; returns the robust cost.
 
     scale : of the Cauchy loss in standard deviations; 0 means plain squares.
-    frames (F, 7, 7), frames_right (F, 7), crossed (N, 7, 3), of_points (P, 3, 3), points_right (P, 3), lenses (6, 6),
-    lens_right (6,), frame_lens (F, 7, 6), point_lens (P, 3, 6).
+    frames (F, 7, 7), frames_right (F, 7), crossed (N, 7, 3), of_points (P, 3, 3), points_right (P, 3), lenses (L, L),
+    lens_right (L,), frame_lens (F, 7, L), point_lens (P, 3, L), of a lens of L columns.
     """
     cost = 0.0
-    stretch = math.exp(lens[3])
-    a = [0.0] * 16
-    b = [0.0] * 16
+    count = len(lens)
+    a, b = np.zeros(10 + count), np.zeros(10 + count)
+    bent = np.zeros(6 + 2 * count)
     for n in range(len(frame)):
         f, p = frame[n], track[n]
         x = rotation[f, 0, 0] * points[p, 0] + rotation[f, 0, 1] * points[p, 1] + rotation[f, 0, 2] * points[p, 2]
         y = rotation[f, 1, 0] * points[p, 0] + rotation[f, 1, 1] * points[p, 1] + rotation[f, 1, 2] * points[p, 2]
         z = rotation[f, 2, 0] * points[p, 0] + rotation[f, 2, 1] * points[p, 1] + rotation[f, 2, 2] * points[p, 2]
         tx, ty, tz = x + translation[f, 0], y + translation[f, 1], z + translation[f, 2]
-        if tz < BEHIND:  # it says nothing of where to go; the cost keeps a step from hiding points behind a camera
+        fx, fy = tx / tz, ty / tz
+        # where there is no picture it says nothing of where to go; the cost keeps a step from hiding points there
+        if tz < BEHIND or not pixel_of(lens, focal[f], fx, fy, bent):
             cost += 1e4
             for i in range(7):
                 for k in range(3):
                     crossed[n, i, k] = 0.0
             continue
-        fx, fy = tx / tz, ty / tz
-        rr = fx * fx + fy * fy
-        bend = 1.0 + lens[1] * rr + lens[2] * rr * rr
-        slope = 2.0 * lens[1] + 4.0 * lens[2] * rr
-        gx = math.exp(lens[0] + focal[f])
-        gy = gx * stretch
-        ex = gx * bend * fx + lens[4] - xy[n, 0]
-        ey = gy * bend * fy + lens[5] - xy[n, 1]
+        ex, ey = bent[0] - xy[n, 0], bent[1] - xy[n, 1]
         # of the pixel by the place over depth, then by the place before the camera
-        uu, uv = gx * (bend + slope * fx * fx), gx * slope * fx * fy
-        vu, vv = gy * slope * fx * fy, gy * (bend + slope * fy * fy)
+        uu, uv, vu, vv = bent[2], bent[3], bent[4], bent[5]
         ux, uy, uz = uu / tz, uv / tz, -(uu * fx + uv * fy) / tz
         vx, vy, vz = vu / tz, vv / tz, -(vu * fx + vv * fy) / tz
-        # columns: turn (3), shift (3), zoom, point (3), lens (6): the derivative in x in a, in y in b
+        # columns: turn (3), shift (3), zoom, point (3), lens: the derivative in x in a, in y in b
         a[0], a[1], a[2] = uz * y - uy * z, ux * z - uz * x, uy * x - ux * y
         b[0], b[1], b[2] = vz * y - vy * z, vx * z - vz * x, vy * x - vx * y
         a[3], a[4], a[5] = ux, uy, uz
         b[3], b[4], b[5] = vx, vy, vz
-        a[6], b[6] = gx * bend * fx, gy * bend * fy
+        a[6], b[6] = bent[6], bent[7]
         for k in range(3):
             a[7 + k] = ux * rotation[f, 0, k] + uy * rotation[f, 1, k] + uz * rotation[f, 2, k]
             b[7 + k] = vx * rotation[f, 0, k] + vy * rotation[f, 1, k] + vz * rotation[f, 2, k]
-        a[10], b[10] = a[6], b[6]
-        a[11], b[11] = gx * rr * fx, gy * rr * fy
-        a[12], b[12] = gx * rr * rr * fx, gy * rr * rr * fy
-        a[13], b[13] = 0.0, b[6]
-        a[14], b[14], a[15], b[15] = 1.0, 0.0, 0.0, 1.0
+        for k in range(count):
+            a[10 + k], b[10 + k] = bent[6 + 2 * k], bent[7 + 2 * k]
         r0, r1, r2 = root[n, 0], root[n, 1], root[n, 2]
         ex, ey = r0 * ex + r1 * ey, r2 * ey
         square = ex * ex + ey * ey
@@ -83,7 +77,7 @@ def accumulate(  # type: ignore[no-untyped-def]
             weight = 1.0 / (1.0 + square / (scale * scale))
         else:
             cost += square
-        for i in range(16):
+        for i in range(10 + count):
             a[i], b[i] = r0 * a[i] + r1 * b[i], r2 * b[i]
         for i in range(7):
             wa, wb = weight * a[i], weight * b[i]
@@ -91,19 +85,19 @@ def accumulate(  # type: ignore[no-untyped-def]
                 frames[f, i, k] += wa * a[k] + wb * b[k]
             for k in range(3):
                 crossed[n, i, k] = wa * a[7 + k] + wb * b[7 + k]
-            for k in range(6):
+            for k in range(count):
                 frame_lens[f, i, k] += wa * a[10 + k] + wb * b[10 + k]
             frames_right[f, i] -= wa * ex + wb * ey
         for i in range(3):
             wa, wb = weight * a[7 + i], weight * b[7 + i]
             for k in range(3):
                 of_points[p, i, k] += wa * a[7 + k] + wb * b[7 + k]
-            for k in range(6):
+            for k in range(count):
                 point_lens[p, i, k] += wa * a[10 + k] + wb * b[10 + k]
             points_right[p, i] -= wa * ex + wb * ey
-        for i in range(6):
+        for i in range(count):
             wa, wb = weight * a[10 + i], weight * b[10 + i]
-            for k in range(6):
+            for k in range(count):
                 lenses[i, k] += wa * a[10 + k] + wb * b[10 + k]
             lens_right[i] -= wa * ex + wb * ey
     return cost

@@ -158,7 +158,8 @@ class _Certainty:
         self._poses = tuple(c for c in solution.free.frame if c != FRAME_FOCAL)
         columns = (*self._poses, FRAME_FOCAL)
         self._nodal = len(self._poses) == 3
-        free = Free(frame=columns, lens=TESTED, zoom=None)
+        self._lens = tuple(sorted({*TESTED, *solution.free.lens}))
+        free = Free(frame=columns, lens=self._lens, zoom=None)
         normal = normal_equations(self._state, part, 0.0, free)
         self._whole = reduced(normal, part, free, 1e-9, frames_out=True)
         zoom = solution.free.zoom
@@ -184,8 +185,8 @@ class _Certainty:
         if self._whole is None:
             return None
         points = 3 * len(self._state.points)
-        lens = [TESTED.index(c) for c in self._solution.free.lens if c in TESTED]
-        first = len(TESTED)
+        lens = [self._lens.index(c) for c in self._solution.free.lens]
+        first = len(self._lens)
         zooms = np.arange(first + points, len(self._whole.right)) if self._zoom is not None else np.zeros(0, int)
         rows = np.concatenate([lens, np.arange(first, first + points), zooms]).astype(int)
         matrix = self._whole.matrix[np.ix_(rows, rows)].copy()
@@ -255,15 +256,15 @@ class _Certainty:
         if self._root is None or self._whole is None:
             return ()
         whole, found = self._whole, self._solution.free
-        zooms = len(TESTED) + 3 * len(self._state.points) + np.arange(len(self._known))
-        tried = [(LENS_NAMES[c], TESTED.index(c)) for c in TESTED if c not in found.lens]
+        zooms = len(self._lens) + 3 * len(self._state.points) + np.arange(len(self._known))
+        tried = [(LENS_NAMES[c], self._lens.index(c)) for c in TESTED if c not in found.lens]
         made: list[Test] = []
         pace = np.linspace(-0.5, 0.5, len(zooms))
         for name, at in tried:
-            if self._zoom is not None and at == TESTED.index(FOCAL):
+            if self._zoom is not None and at == self._lens.index(FOCAL):
                 continue
             column = whole.matrix[self._rows, at]
-            made.append(self._test(name, column, whole.matrix[at, at], whole.right[at], self._value(TESTED[at])))
+            made.append(self._test(name, column, whole.matrix[at, at], whole.right[at], self._value(self._lens[at])))
         if self._zoom is None and len(zooms) > 2:
             column = whole.matrix[np.ix_(self._rows, zooms)] @ pace
             own = float(pace @ whole.matrix[np.ix_(zooms, zooms)] @ pace)

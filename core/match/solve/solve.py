@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from core.errors import UserError
+from core.match.lens import model_named
 from core.match.solve.bundle import POSE, TURN, Free, adjust
 from core.match.solve.first import Cameras, Grower, best_pairs, keyframes, rays, triangulated
 from core.match.solve.floor import noise_floor
@@ -46,13 +47,14 @@ ROUNDS, REFOCUSED = 2, 0.002  # of a camera whose distortion was taken out at a 
 
 class Options(NamedTuple):
     """focal : pixels, or None. free_focal : find it too. zoom : it changes from frame to frame.
-    distortion : find k1 too. nodal : the camera only turns."""
+    distortion : find the bend of the lens too. nodal : the camera only turns. lens : a model of core/match/lens.py."""
 
     focal: float | None = None
     free_focal: bool = False
     zoom: bool = False
     distortion: bool = False
     nodal: bool = False
+    lens: str = "brown"
 
 
 AS_GIVEN = Options()
@@ -232,7 +234,7 @@ class _Problem:
         self.pixels, told = _noise(self.observations, views, size)
         self.noise = self.pixels * float(np.median(self.observations.root[:, 0]))
         self.least = self.noise if told else 0.2 * self.noise  # photographs may be seen better than usual
-        self.options, self.lens, self.progress = options, start_lens(focal, *size), progress
+        self.options, self.lens, self.progress = options, start_lens(focal, *size, options.lens), progress
         self.keys = self._keys()
         self.part = self._of_keyframes()
 
@@ -300,7 +302,7 @@ class _Problem:
 
     def _lenses(self, free: bool) -> list[tuple[tuple[int, ...], bool]]:
         """What of the lens may be free, and whether it zooms: what was asked for, then richer ones."""
-        bent: tuple[int, ...] = (K1,) if self.options.distortion else ()
+        bent: tuple[int, ...] = model_named(self.options.lens).first if self.options.distortion else ()
         if len(self.views.cameras) > 1:  # focal lengths are columns of the frames then
             zoom, richer = self.options.zoom, (K1,)
             return [(bent, zoom)] if bent else [(bent, zoom), (richer, zoom)]
@@ -374,7 +376,10 @@ class _Problem:
         observations, count = self.observations, len(self.frames)
         zoom = self._tied(np.arange(count), zoom=start.zoom)
         columns = (TURN if nodal else POSE) + ((FRAME_FOCAL,) if zoom is not None else ())
-        free = Free(frame=columns, lens=start.lens_columns, zoom=zoom)
+        lens = start.lens_columns
+        if self.options.distortion:
+            lens = tuple(sorted({*lens, *model_named(self.options.lens).found}))
+        free = Free(frame=columns, lens=lens, zoom=zoom)
         least = 1e-6 if nodal else 1e-12
         used = known[observations.frame] & held[observations.track]
         self.progress("adjusting all frames together")

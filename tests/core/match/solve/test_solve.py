@@ -9,6 +9,7 @@ from core.errors import UserError
 from core.formats import usd_solve
 from core.match.solve.bundle import POSE, TURN, Free, adjust, smooth_zoom
 from core.match.solve.report import report
+from core.match.solve.shot import shot_of
 from core.match.solve.solve import Options, observations_of, solve
 from core.match.solve.state import FRAME_FOCAL, Observations, projected
 from core.match.track import keyed_track
@@ -130,7 +131,7 @@ def test_the_camera_of_the_file_sees_the_points_where_the_solve_does(tmp_path):
     made = shot("zoom", 30, 12, seed=4)
     found = solve(made.observations, made.frames, 30, SIZE, Options(FOCAL, zoom=True))
     path = tmp_path / "solve.usda"
-    usd_solve.write(path, found, report(found, _names(made)), _names(made))
+    usd_solve.write(path, shot_of(found, _names(made)), {})
     stage = Usd.Stage.Open(str(path))
     points = np.array(UsdGeom.Points(stage.GetPrimAtPath("/Solve/points")).GetPointsAttr().Get(), float)
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (1001, 1012)

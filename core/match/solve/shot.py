@@ -1,0 +1,84 @@
+"""A camera path with its lens and points, as programs exchange it: what a solve gives away, what a file brings."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from core.match.lens import bent, start_lens
+from core.match.solve.solve import Solution
+from core.match.solve.state import ASPECT, FOCAL, Array, Rows
+
+FLIP = np.diag([1.0, -1.0, -1.0])  # y down, z ahead <-> y up, z back
+
+
+class Shot(NamedTuple):
+    """A camera of F frames and P points. Cameras as the solver has them: x right, y down, looking along +z.
+
+    size : pixels of the plate. frames (F,) their numbers, rising. rotation (F, 3, 3) camera_from_world, translation
+    (F, 3). focal (F,) pixels across. lens (L,) of `core/match/lens.py`; its focal length is that of the first frame.
+    points (P, 3) in world, names of them. The world is y down as well; programs get it y up.
+    """
+
+    size: tuple[int, int]
+    frames: Rows
+    rotation: Array
+    translation: Array
+    focal: Array
+    lens: Array
+    points: Array
+    names: tuple[str, ...]
+
+    def centres(self) -> Array:
+        """(F, 3) where the cameras stand."""
+        return -np.einsum("fji,fj->fi", self.rotation, self.translation)
+
+    @property
+    def zooms(self) -> bool:
+        """Whether the focal length changes."""
+        return bool(np.ptp(self.focal) > 1e-9 * float(self.focal[0]))
+
+    @property
+    def stretch(self) -> float:
+        """Height of a pixel's picture over its width: focal length in pixels down over that across."""
+        return float(np.exp(self.lens[ASPECT]))
+
+    def up(self) -> tuple[Array, Array]:
+        """(F, 4, 4) world_from_camera and (P, 3) points with y up and cameras that look along -z."""
+        matrix = np.tile(np.eye(4), (len(self.frames), 1, 1))
+        matrix[:, :3, :3] = FLIP @ self.rotation.transpose(0, 2, 1) @ FLIP
+        matrix[:, :3, 3] = self.centres() @ FLIP
+        return matrix, np.asarray(self.points @ FLIP)
+
+    def pixels(self, row: int, points: Array) -> Array:
+        """(N, 2) where points (N, 3) are seen in the plate, lens and all."""
+        seen = points @ self.rotation[row].T + self.translation[row]
+        return bent(self.lens, float(np.log(self.focal[row]) - self.lens[FOCAL]), seen[:, :2] / seen[:, 2:])
+
+
+def shot_of(solution: Solution, names: list[str]) -> Shot:
+    """What a solve gives away: the frames of its first camera that are known, the points that are held."""
+    known = np.flatnonzero(solution.known & (solution.views.camera == 0))
+    held = np.flatnonzero(solution.held)
+    state = solution.state
+    focal = np.exp(state.lens[FOCAL] + state.focal[known])
+    lens = state.lens.copy()
+    lens[FOCAL] = np.log(focal[0]) if len(known) else lens[FOCAL]
+    return Shot(
+        solution.size, solution.frames[known], state.rotation[known], state.translation[known], focal, lens,
+        state.points[held], tuple(names[k] for k in held),
+    )
+
+
+def shot_from_up(
+    size: tuple[int, int], frames: Rows, matrix: Array, focal: Array, points: Array, names: tuple[str, ...] = (),
+    lens: Array | None = None,
+) -> Shot:
+    """A shot from (F, 4, 4) world_from_camera and points with y up; without `lens` one that does not bend."""
+    rotation = np.ascontiguousarray(FLIP @ matrix[:, :3, :3].transpose(0, 2, 1) @ FLIP)
+    translation = -np.einsum("fij,fj->fi", rotation, matrix[:, :3, 3] @ FLIP)
+    if lens is None:
+        lens = start_lens(float(focal[0]), *size)
+    names = names or tuple(f"point{k + 1}" for k in range(len(points)))
+    return Shot(size, frames, rotation, translation, focal, lens, points.reshape(-1, 3) @ FLIP, names)
