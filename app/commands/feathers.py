@@ -9,29 +9,29 @@ from typing import Annotated
 import typer
 
 from app.deliver import posed_document
+from app.feather_frames import MATERIAL, Figures, export_frame, frame_range, worse
 from app.report import Report, peak_megabytes
-from core.document import Document, MeshObject
+from core.document import Document, MeshObject, with_feathers, with_groom
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.feather.coat.coat import PLACEMENTS, FeatherCoat
+from core.feather.coat.coat import PLACEMENTS
 from core.feather.coat.dress import KEYS, Dressed, dress_feathers
-from core.feather.coat.export import instances, left_crossing, shown_rows
 from core.feather.coat.plumage import Laid, Plumage
 from core.formats import rig_file
 from core.formats.atomic import atomic_write
 from core.formats.curve_file import maker
 from core.formats.mesh_file import read_mesh
+from core.formats.project import write_project
 from core.formats.rig_assembly import NoRig
-from core.formats.usd_feathers import SUFFIXES, FeatherFrame, FeatherWriter
+from core.formats.usd_feathers import SUFFIXES, FeatherWriter
 from core.mesh.skin import Skin
 
 CHOICES = tuple(kind for kind in PLACEMENTS if kind not in ("hand", "field"))  # these need an artist
-EXPORTED = ("age", "spacing", "tract")
 
 
 def command(
     mesh: Annotated[Path, typer.Argument(help="The bird: OBJ, PLY, STL, OFF, GLB/glTF, USD, Alembic.", show_default=False)],
-    output: Annotated[list[Path], typer.Option("--output", "-o", help="Where the coat goes: .usdc .usda .usd. May be given again.", show_default=False)],
+    output: Annotated[list[Path], typer.Option("--output", "-o", help="Where the coat goes: .filo .usdc .usda .usd. May be given again.", show_default=False)],
     count: Annotated[int, typer.Option(min=0, max=2_000_000, help="Feathers, exactly.")] = 10_000,
     preset: Annotated[str, typer.Option(help="The bird the feathers are of.")] = "goldfinch",
     placement: Annotated[str, typer.Option(help=f"How feathers are set: {', '.join(CHOICES)}.")] = "rows",
@@ -75,26 +75,11 @@ def command(
     ])
 
 
-def frame_range(words: str | None) -> tuple[int, int] | None:
-    """The frames of "A-B" (or of "A" alone), None where none are named; wrong usage when it is neither."""
-    if words is None:
-        return None
-    sign, rest = ("-", words[1:]) if words.startswith("-") else ("", words)
-    first, _, last = rest.partition("-")
-    try:
-        begin = int(sign + first)
-        end = int(last) if last else begin
-    except ValueError:
-        raise typer.BadParameter(f"frames are two numbers such as 1001-1024, not {words!r}") from None
-    if end < begin:
-        raise typer.BadParameter(f"the last frame {end} comes before the first, {begin}")
-    return begin, end
-
-
 def _check(outputs: list[Path]) -> None:
+    known = (".filo", *SUFFIXES)
     for path in outputs:
-        if path.suffix.lower() not in SUFFIXES:
-            raise UserError(f"{path.name}: feathers are written as {', '.join(SUFFIXES)}; choose one of these suffixes")
+        if path.suffix.lower() not in known:
+            raise UserError(f"{path.name}: feathers are written as {', '.join(known)}; choose one of these suffixes")
         if not path.resolve().parent.is_dir():
             raise UserError(f"the folder {path.resolve().parent} does not exist; make it first")
         if path.is_dir():
@@ -115,17 +100,20 @@ def _document(path: Path, unit: str | None, up: str | None, moving: bool, report
 def _written(
     outputs: list[Path], document: Document, dressed: Dressed, plumage: Plumage, rest: Laid,
     wanted: tuple[int, int] | None, each: bool, evaluator: Evaluator, report: Report,
-) -> dict[str, object]:
+) -> Figures:
     """Write every frame to every output; the worst counts of all frames, made on what was written."""
     item = document.meshes[0]
-    numbers = [rest_frame(document)] if wanted is None else list(range(wanted[0], wanted[1] + 1))
-    figures: dict[str, object] = {}
+    numbers = [document.first_frame] if wanted is None else list(range(wanted[0], wanted[1] + 1))
+    figures: Figures = {}
     with ExitStack() as stack:
         writers = []
         for path in outputs:
+            if path.suffix.lower() == ".filo":
+                write_project(path, with_feathers(with_groom(document, dressed.keys), dressed.coat))
+                continue
             temporary = stack.enter_context(atomic_write(path))
             writers.append(FeatherWriter(
-                temporary, dressed.coat.name, item.mesh, maker(), (0.32, 0.24, 0.14), wanted is not None,
+                temporary, dressed.coat.name, item.mesh, maker(), MATERIAL, wanted is not None,
                 document.fps))
         for frame in numbers:
             with report.stage("frames", f"frame {frame}"):
@@ -133,54 +121,11 @@ def _written(
                 if wanted is not None:
                     skin: Skin = posed_document(document, float(frame), evaluator)[item.id]
                     laid = plumage.at_frame(dressed.coat, dressed.keys, item.mesh, skin, float(frame))
-                written, made = export_frame(dressed.coat, laid, frame, each, evaluator)
-            figures = _worse(figures, made)
+                written, made = export_frame(laid, frame, each, evaluator)
+            figures = worse(figures, made)
             with report.stage("export", f"writing frame {frame}"):
                 for writer in writers:
                     writer.write(written)
         for writer in writers:
             writer.close(*(map(float, wanted) if wanted is not None else ()))
     return figures
-
-
-def _worse(one: dict[str, object], other: dict[str, object]) -> dict[str, object]:
-    """The figures of the worst frame: the greater of every number, the longer list."""
-    if not one:
-        return other
-    size = {key: len(value) if isinstance(value, list) else value for key, value in one.items()}
-    return {
-        key: value if (len(value) if isinstance(value, list) else value) >= size[key] else one[key]  # type: ignore[operator]
-        for key, value in other.items()
-    }
-
-
-def rest_frame(document: Document) -> int:
-    """The frame at which a coat at rest takes its animated values."""
-    return document.first_frame
-
-
-def export_frame(
-    coat: FeatherCoat, laid: Laid, frame: float, each: bool, evaluator: Evaluator
-) -> tuple[FeatherFrame, dict[str, object]]:
-    """One frame as it is written, and what crosses in it."""
-    rows = shown_rows(laid)
-    attributes = {name: laid.fields[name][rows] for name in EXPORTED if name in laid.fields}
-    figures: dict[str, object]
-    if each:
-        left = left_crossing(laid, evaluator.workers)
-        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], laid.layered.vanes[rows], attributes)
-        figures = {}
-    else:
-        found = instances(laid, evaluator.workers)
-        left = found.left
-        made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
-        figures = {
-            "shapes": len(found.prototypes), "quantising_error": found.error,
-            "crossings_16_bit": len(found.coarse.first),
-        }
-    ids = laid.ids[rows]
-    worst = [[int(ids[a]), int(ids[b])] for a, b in zip(left.first, left.second, strict=True)]
-    return made, {
-        "feathers": len(rows), "crossings": len(left.first), "skin_hits": len(left.skin), "pairs": left.pairs,
-        **figures, "worst": worst[:100],
-    }

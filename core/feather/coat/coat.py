@@ -111,11 +111,13 @@ class KeyAttributes(Record):
 class Proxy(Record):
     """A feather taken over by hand: its shaft at keyed frames, in the frame of its root, so that it rides on the skin.
 
-    id : of the feather. frames : (F,) float32, ascending. shafts : (F, P, 3) float32, metres: right, along, out.
+    id : of the feather. rest : (P, 3) float32, its shaft when it was taken over, metres: right, along, out.
+    frames : (F,) float32, ascending. shafts : (F, P, 3) float32, as `rest`.
     rolls : (F,) float32, radians about the shaft.
     """
 
     id: int
+    rest: np.ndarray
     frames: np.ndarray
     shafts: np.ndarray
     rolls: np.ndarray
@@ -123,12 +125,13 @@ class Proxy(Record):
     def __post_init__(self) -> None:
         number(self, "id", least=0, most=2**31 - 1)
         column(self, "frames", np.float32, (None,))
-        column(self, "shafts", np.float32, (len(self.frames), None, 3))
+        column(self, "rest", np.float32, (None, 3))
+        column(self, "shafts", np.float32, (len(self.frames), len(self.rest), 3))
         column(self, "rolls", np.float32, (len(self.frames),))
         if not len(self.frames) or np.any(np.diff(self.frames) <= 0.0):
             raise ValueError("Proxy.frames must ascend, and there must be one")
-        if self.shafts.shape[1] < 2:
-            raise ValueError("Proxy.shafts needs at least 2 points on the shaft")
+        if len(self.rest) < 2:
+            raise ValueError("Proxy.rest needs at least 2 points on the shaft")
 
 
 class FeatherCoat(Record):

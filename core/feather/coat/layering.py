@@ -117,6 +117,32 @@ def layer_again(
     return laid
 
 
+def layer_around(
+    feathers: Feathers, laid: Layered, pinned: NDArray[np.int32], bvh: Bvh, workers: Workers
+) -> Layered:
+    """The coat after the vanes of the rows `pinned` (n,) int32 were put elsewhere by hand: others make way."""
+    rank = feathers.rank.copy()
+    rank[pinned] = np.inf  # they lie where they lie, all others over them
+    boxes = laid.boxes.copy()
+    boxes[pinned] = vane_boxes(laid.vanes[pinned])
+    vanes, poses = laid.vanes.copy(), laid.poses.copy()
+    mine = np.zeros(len(poses), np.bool_)
+    mine[pinned] = True
+    kept = ~(mine[laid.first] | mine[laid.second])
+    first, second = _pairs_of(pinned, mine, _widened(boxes, poses))
+    suspects = np.zeros(len(poses), np.bool_)
+    meet = crossing_pairs(vanes, boxes, first, second, workers.ranges)
+    suspects[first[meet]] = True
+    suspects[second[meet]] = True
+    suspects[pinned] = False
+    moved = laid._replace(
+        poses=poses, vanes=vanes, boxes=boxes, first=np.concatenate([laid.first[kept], first]),
+        second=np.concatenate([laid.second[kept], second]),
+    )
+    _settle(feathers._replace(rank=rank), moved, suspects, bvh, True, BENT_BACK)
+    return moved
+
+
 def raised(
     feathers: Feathers, base: NDArray[np.float64], near: NDArray[np.int32], bvh: Bvh, workers: Workers,
     bent_back: float = BENT_BACK,

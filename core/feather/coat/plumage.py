@@ -25,6 +25,7 @@ from core.feather.coat.layering import Feathers, Layered, layer, layer_again
 from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.feather.coat.proxy import apply_proxies
 from core.feather.vane import SHAPE_COLUMNS, vane_grids
 from core.groom.groom import Groom, Map
 from core.groom.maps import sample_map
@@ -82,13 +83,25 @@ class Plumage:
         self._evaluator = evaluator
         self._memory: dict[str, tuple[tuple[Any, ...], Any]] = {}
 
-    def at_rest(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, frame: float = 1001.0) -> Laid:
-        """The coat on the mesh at rest; animated values as at `frame`."""
+    def at_rest(
+        self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, frame: float = 1001.0, quick: bool = False
+    ) -> Laid:
+        """The coat on the mesh at rest, without what proxies do; animated values as at `frame`.
+
+        quick : while an artist works: only feathers that changed since the last call, and those over them, settle
+            anew. What is kept or written never depends on what was there before.
+        """
         bed, binding = self.bed(coat, keys, mesh), self._binding(coat, keys, mesh)
+        full = self._memory.get("layer")
+        quick = quick and full is not None
+        if not quick:  # the order is that of the whole coat, not of what it was while a brush moved
+            self._memory.pop("kept order", None)
+        elif "kept order" not in self._memory and "order" in self._memory:
+            self._memory["kept order"] = self._memory["order"]
         base = self._remember(
-            "base", lambda: self._base(coat, keys, mesh, bed, binding, frame), coat, keys, mesh, frame)
+            "base", lambda: self._base(coat, keys, mesh, bed, binding, frame), *_looks(coat), keys, mesh, frame, quick)
         skin = skin_at_rest(mesh, self._evaluator)
-        layered = self._remember("layer", lambda: self._layer(coat, base, bed, skin), coat.layered, base)
+        layered = self._settled(coat, base, bed, skin, quick)
         return self._laid(coat, bed, layered, base, skin, frame)
 
     def at_frame(
@@ -96,18 +109,23 @@ class Plumage:
     ) -> Laid:
         """The coat on `skin`, the mesh as it is posed at `frame`, from the order and the settling at rest."""
         rest = self.at_rest(coat, keys, mesh, rest_frame)
-        still = skin.points is mesh.points
-        if still and not any(moves(getattr(coat, name)) for name in FEATHER_VALUES):
+        still = skin.points is mesh.points and not moving(coat)
+        if still and not coat.proxies:
             return rest
         bed, workers = rest.bed, self._evaluator.workers
-        base = self._base(coat, keys, mesh, bed, self._binding(coat, keys, mesh), rest_frame, skin, frame)
-        resting = self._memory["base"][1]
-        poses = base.poses + (rest.layered.poses - resting.poses)
-        poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
-        if coat.layered:
-            layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, may_shorten=False)
-        else:
-            layered = _unlayered(base.feathers, poses, workers.ranges)
+        resting: Base = self._memory["base"][1]
+        base, layered = resting, rest.layered
+        if not still:
+            base = self._base(coat, keys, mesh, bed, self._binding(coat, keys, mesh), rest_frame, skin, frame)
+            poses = base.poses + (rest.layered.poses - resting.poses)
+            poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
+            if coat.layered:
+                layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, may_shorten=False)
+            else:
+                layered = _unlayered(base.feathers, poses, workers.ranges)
+        if coat.proxies:
+            frames = self.root_frames(coat, keys, mesh, skin)
+            layered = apply_proxies(coat, rest.ids, base.feathers, frames, layered, frame, skin.bvh, workers)
         return self._laid(coat, bed, layered, base, skin, frame)
 
     def bed(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh) -> Bed:
@@ -123,7 +141,7 @@ class Plumage:
 
     def _remember(self, name: str, make: Callable[[], Any], *inputs: Any) -> Any:
         known = self._memory.get(name)
-        if known is not None and all(a is b for a, b in zip(known[0], inputs, strict=True)):
+        if known is not None and len(known[0]) == len(inputs) and all(map(_same, known[0], inputs)):
             return known[1]
         made = make()
         self._memory[name] = (inputs, made)
@@ -139,17 +157,39 @@ class Plumage:
             "binding", lambda: bind_to_keys(mesh, guides, bed.places, self._evaluator), bed, guides.roots
         )
 
-    def _layer(self, coat: FeatherCoat, base: Base, bed: Bed, skin: Skin) -> Layered:
+    def _settled(self, coat: FeatherCoat, base: Base, bed: Bed, skin: Skin, quick: bool) -> Layered:
+        """The feathers at rest, settled: from nothing, or for a `quick` look from what was there before."""
         workers = self._evaluator.workers
-        if not coat.layered:
-            return _unlayered(base.feathers, base.poses, workers.ranges)
-        before = self._memory.get("layer")
-        if before is not None:
-            known_base, laid = before[0][1], before[1]
-            changed = changed_rows(known_base, base)
-            if changed is not None and len(changed) < len(base.poses) // 4 and before[0][0] is coat.layered:
-                return layer_again(base.feathers, laid, base.poses, changed, skin.bvh, workers)
-        return layer(base.feathers, base.poses, bed.ground.near, skin.bvh, workers)
+
+        def whole() -> Layered:
+            if not coat.layered:
+                return _unlayered(base.feathers, base.poses, workers.ranges)
+            return layer(base.feathers, base.poses, bed.ground.near, skin.bvh, workers)
+
+        full = self._memory.get("layer")
+        before = self._memory.get("quick", full)
+        if not quick or before is None or not coat.layered or (full is not None and full[0][1] is base):
+            self._memory.pop("quick", None)
+            return self._remember("layer", whole, coat.layered, base)
+        (was_layered, known_base), laid = before
+
+        def again() -> Layered:
+            changed = changed_rows(known_base, base) if was_layered else None
+            if changed is None or len(changed) > len(base.poses) // 3:
+                return whole()
+            return layer_again(base.feathers, laid, base.poses, changed, skin.bvh, workers)
+
+        return self._remember("quick", again, coat.layered, base)
+
+    def root_frames(
+        self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, skin: Skin | None = None
+    ) -> NDArray[np.float32]:
+        """Frames (N, 3, 3) of the roots, rows right, along, out, as keys lay them: what proxies are kept in."""
+        bed = self.bed(coat, keys, mesh)
+        rest, flow = self._directions(coat, keys, mesh, bed, self._binding(coat, keys, mesh))
+        if skin is None or skin.points is mesh.points:
+            return rest
+        return _carried(mesh, bed, rest, flow, skin)[1]
 
     def _base(
         self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None, rest_frame: float,
@@ -163,11 +203,17 @@ class Plumage:
         bend_of = self._remember(
             "curvature", lambda: _curved(bed.positions, flow_frames, near, ranges), bed, directions)
         fields = self._fields(coat, keys, mesh, bed, binding, directions, bend_of)
-        rank, sides = self._remember("order", lambda: _ordered(bed, flow_frames, ranges), bed, directions)
+        kept = self._memory.get("kept order")
+        if kept is not None and len(kept[1][0]) == count:
+            rank, sides = kept[1]
+        else:
+            rank, sides = self._remember("order", lambda: _ordered(bed, flow_frames, ranges), bed, directions)
+        now = rest_frame if frame is None else frame
         own = self._remember(
             "own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields, coat.attributes, coat.width,
             None if keys is None else keys.maps)
-        now = rest_frame if frame is None else frame
+        if (now != rest_frame and any(moves(item.value) for item in coat.attributes)) or moves(coat.width):
+            own = self._own(coat, fields, now, mesh, keys, bed)  # what is animated, at this frame alone
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
         positions, normals, frames = bed.positions, bed.normals, rest_frames
         if skin is not None:
@@ -269,7 +315,20 @@ class Plumage:
         width = self._number(coat, "width", fields, frame, mesh, keys, bed)
         for name in SIZED[1:]:
             table[:, SHAPE_COLUMNS[name]] *= width
-        return vane_grids(table, ROWS, COLUMNS, self._evaluator.workers.ranges)
+        known = self._memory.get("vanes")
+        if known is not None and known[0][0].shape == table.shape:
+            before, vanes = known[0][0], known[1]
+            differ = np.flatnonzero((before != table).any(axis=1))
+            if not len(differ):
+                return vanes
+            if len(differ) < len(table) // 2:
+                vanes = vanes.copy()
+                vanes[differ] = vane_grids(table[differ], ROWS, COLUMNS, self._evaluator.workers.ranges)
+                self._memory["vanes"] = ((table,), vanes)
+                return vanes
+        vanes = vane_grids(table, ROWS, COLUMNS, self._evaluator.workers.ranges)
+        self._memory["vanes"] = ((table,), vanes)
+        return vanes
 
     def _number(
         self, coat: FeatherCoat, name: str, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None,
@@ -309,9 +368,30 @@ class Plumage:
         return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields)
 
 
+def _same(a: Any, b: Any) -> bool:
+    return a is b or (isinstance(a, int | float | str) and type(a) is type(b) and a == b)
+
+
+LOOKS = tuple(
+    name for name in FeatherCoat.__struct_fields__
+    if name not in ("id", "name", "proxies", "density", "layered", "hidden", "locked")
+)
+
+
+def _looks(coat: FeatherCoat) -> tuple[Any, ...]:
+    """What of a coat the feathers before settling come from."""
+    return tuple(getattr(coat, name) for name in LOOKS)
+
+
 def moves(value: Value) -> bool:
     """True when a value depends on the frame."""
     return isinstance(value.base, Curve) or (isinstance(value.base, Formula) and "frame" in names_used(value))
+
+
+def moving(coat: FeatherCoat) -> bool:
+    """True when anything of a coat depends on the frame by itself."""
+    given = [item.value for item in coat.attributes] + [getattr(coat, name) for name in FEATHER_VALUES]
+    return any(moves(value) for value in given)
 
 
 def changed_rows(before: Base, after: Base) -> NDArray[np.int32] | None:

@@ -1,0 +1,71 @@
+"""Frames of feathers on their way out: what one frame writes, and what still crosses in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from core.evaluator import Evaluator
+from core.feather.coat.export import instances, left_crossing, shown_rows
+from core.feather.coat.plumage import Laid
+from core.formats.usd_feathers import FeatherFrame
+
+Figures = dict[str, Any]
+EXPORTED = ("age", "spacing", "tract")  # columns every program gets beside places and ids
+MATERIAL = (0.32, 0.24, 0.14)  # linear RGB
+LISTED = 100  # crossing pairs named in a report
+
+
+def frame_range(words: str | None) -> tuple[int, int] | None:
+    """The frames of "A-B" (or of "A" alone), None where none are named; wrong usage when it is neither."""
+    if words is None:
+        return None
+    sign, rest = ("-", words[1:]) if words.startswith("-") else ("", words)
+    first, _, last = rest.partition("-")
+    try:
+        begin = int(sign + first)
+        end = int(last) if last else begin
+    except ValueError:
+        raise typer.BadParameter(f"frames are two numbers such as 1001-1024, not {words!r}") from None
+    if end < begin:
+        raise typer.BadParameter(f"the last frame {end} comes before the first, {begin}")
+    return begin, end
+
+
+def worse(one: Figures, other: Figures) -> Figures:
+    """The figures of the worst frame: the greater of every number, the longer list."""
+    if not one:
+        return other
+    size = {key: len(value) if isinstance(value, list) else value for key, value in one.items()}
+    return {
+        key: value if (len(value) if isinstance(value, list) else value) >= size[key] else one[key]
+        for key, value in other.items()
+    }
+
+
+def export_frame(
+    laid: Laid, frame: float, each: bool, evaluator: Evaluator
+) -> tuple[FeatherFrame, Figures]:
+    """One frame as it is written, and what crosses in it."""
+    rows = shown_rows(laid)
+    attributes = {name: laid.fields[name][rows] for name in EXPORTED if name in laid.fields}
+    figures: Figures
+    if each:
+        left = left_crossing(laid, evaluator.workers)
+        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], laid.layered.vanes[rows], attributes)
+        figures = {}
+    else:
+        found = instances(laid, evaluator.workers)
+        left = found.left
+        made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
+        figures = {
+            "shapes": len(found.prototypes), "quantising_error": found.error,
+            "crossings_16_bit": len(found.coarse.first),
+        }
+    ids = laid.ids[rows]
+    worst = [[int(ids[a]), int(ids[b])] for a, b in zip(left.first, left.second, strict=True)]
+    return made, {
+        "feathers": len(rows), "crossings": len(left.first), "skin_hits": len(left.skin), "pairs": left.pairs,
+        **figures, "worst": worst[:LISTED],
+    }
