@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import re
 from pathlib import Path
@@ -29,8 +30,12 @@ def command(
         wanted = int(match[1]), int(match[2])
     if screenshot is not None and screenshot.suffix.lower() != ".png":
         raise UserError(f"{screenshot.name}: pictures are written as .png")
-    # only here Qt is loaded: every other command runs on machines that have none
-    start = importlib.import_module("app.window.start")
-    code = start.run(start.Wish(file, demo, wanted, screenshot, after, safe))
+    gc.disable()  # loading leaves nothing to collect, and looking for it takes a sixth of the start
+    try:
+        # only here Qt is loaded: every other command runs on machines that have none
+        start = importlib.import_module("app.window.start")
+        code = start.run(start.Wish(file, demo, wanted, screenshot, after, safe))
+    finally:
+        gc.enable()
     if code:
         raise typer.Exit(code)

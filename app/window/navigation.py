@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from app.deliver import turned_view
 from app.window.desk import Desk
+from app.window.jobs import Asked, Progress
 from app.window.keymap import Navigation
 from app.window.match.eye import PlateEye
 from core import navigate
@@ -241,9 +241,12 @@ class Eye:
         def failed(error: Exception) -> None:
             done(AHEAD)
 
-        self.desk.jobs.start(
-            f"Look at {item.name}", lambda progress, cancelled: turned_view(AHEAD, skin_at_rest(mesh, evaluator)), done,
-            failed)
+        def look(progress: Progress, cancelled: Asked) -> tuple[float, float, float]:
+            from app.deliver import turned_view  # with all that writes coats: an empty window does without
+
+            return turned_view(AHEAD, skin_at_rest(mesh, evaluator))
+
+        self.desk.jobs.start(f"Look at {item.name}", look, done, failed)
 
     def _direction(self, side: str) -> tuple[float, float, float]:
         (x, y, z), (right, _, front) = navigate.SIDES[side], self.facing or AHEAD

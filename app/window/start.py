@@ -7,6 +7,7 @@ how far that is, and already takes what is to be opened.
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import sys
 import traceback
@@ -216,6 +217,9 @@ def open_window(wish: Wish, loaded: LoadedSettings) -> MainWindow:
     if wish.screenshot is None:
         window.offer_lost_work()
     _collect_here(window)
+    # what draws comes with every kernel of a coat: it is loaded while the artist looks where to begin
+    window.desk.jobs.start(
+        "Loading", lambda progress, cancelled: importlib.import_module("app.window.live_picture"), lambda module: None)
     return window
 
 
@@ -225,7 +229,6 @@ def _collect_here(window: MainWindow) -> None:
     Jobs on other threads would collect them there, of which Qt dies. What the start has made is left out, so that a
     collection takes a few milliseconds.
     """
-    gc.collect()
     gc.freeze()
     gc.disable()
     window.viewport.settled.connect(gc.collect)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -37,11 +38,11 @@ from app.window.commands import Commands
 from app.window.desk import Desk
 from app.window.gestures import BrushDrag, Gestures
 from app.window.hotkeys import Hotkeys
-from app.window.live_picture import LivePicture, Stopwatch
 from app.window.match.view import PlateView
 from app.window.navigation import CameraDrag, Eye
 from app.window.pose.overlay import skeleton_of
 from app.window.pose.views import PoseViews
+from app.window.stopwatch import Stopwatch
 from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
 from app.window.theme import look_of, text_font
 from core.document import Document
@@ -52,9 +53,12 @@ from core.workspace import Workspace
 from tools.tool import Pointer, Sight
 from viewport.gate import gate_marks
 from viewport.hud import Byte3
-from viewport.live_scene import Done, Job
 from viewport.panes import corner_of, pane_at, size_of
 from viewport.view import HudLine
+
+if TYPE_CHECKING:
+    from app.window.live_picture import LivePicture
+    from viewport.live_scene import Done, Job
 
 NO_GL = "The view needs OpenGL 3.3, and this computer offers {found}. Install or update its graphics driver."
 CALM_MS = 120  # after the last movement, before the picture is finished
@@ -216,6 +220,8 @@ class Viewport(QOpenGLWindow):
 
     def initializeGL(self) -> None:
         """Take hold of the context Qt made; say so when it is too old."""
+        from app.window.live_picture import LivePicture  # with every kernel of a coat: an empty window does without
+
         try:
             self._ctx = moderngl.create_context(require=330)
         except Exception as error:  # glcontext raises bare Exceptions

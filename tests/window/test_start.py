@@ -96,6 +96,17 @@ def test_without_a_display_it_is_one_sentence(variables: dict[str, str | None], 
     assert "Traceback" not in done.stderr
 
 
+def test_an_empty_window_needs_no_library_that_only_work_needs() -> None:
+    code = (
+        "import sys, app.window.start, app.window.main\n"
+        "late = {'scipy.fft', 'scipy.ndimage', 'scipy.optimize', 'scipy.stats', 'av', 'pxr', 'alembic', 'OpenImageIO', "
+        "'PyOpenColorIO', 'poselib', 'trimesh', 'core.groom.children', 'core.mesh.intrinsic', 'core.match.runs'}\n"
+        "print(sorted(late & set(sys.modules)))")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=120, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_a_file_that_is_not_there_is_one_sentence(home: Path) -> None:
     done = start(home, home / "nothing.filo")
     assert done.returncode == 1

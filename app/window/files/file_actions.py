@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QPoint, QProcess, Qt
 from PySide6.QtWidgets import QMenu
 
-from app.deliver import deliver
 from app.window.files.opening import MESH_SUFFIXES, PICTURE_SUFFIXES, choose_file, filter_of
 from app.window.files.recent import RecentMenu
 from app.window.screenshot import view_image
@@ -22,7 +21,6 @@ from core.formats.camera_file import FileCamera, read_cameras
 from core.formats.mesh_file import MeshFile, read_mesh
 from core.formats.project import write_project
 from core.gate import gate_of
-from core.groom.grow import grow
 from core.navigate import whole_in
 from core.workspace import Reference
 from tools.document_edits import Replaced, replaced_mesh
@@ -129,6 +127,9 @@ class FileActions:
         document = self._desk.session.history.current
 
         def write(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> None:
+            from app.deliver import deliver  # with every kernel of a coat: the start of the window does without
+            from core.groom.grow import grow
+
             evaluator = Evaluator()
             try:
                 children = grow(groom, find_mesh(document, groom.mesh_id).mesh, evaluator)

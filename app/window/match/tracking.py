@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,11 @@ from core.image.plate import Plate
 from core.image.plate_view import plate_size
 from core.match.follow import Stretch, Way, stretch_of, with_found
 from core.match.outline import Mask, held_off
-from core.match.plane_tracker import plane_steps
 from core.match.track import PlaneTrack, Track, TrackSettings
-from core.match.tracker import Step, Tracking
 from tools.match_edits import add_tracks, put_planes, put_tracks, selected_tracks, shown_plate
+
+if TYPE_CHECKING:
+    from core.match.tracker import Step
 
 STEPS = {
     "forward": "Track forward", "backward": "Track backward", "next": "Track one frame on",
@@ -44,6 +45,8 @@ class Work:
         cancelled: Asked,
     ) -> tuple[Track, ...]:
         """Follow what is to be followed; every step goes to `steps` at once."""
+        from core.match.tracker import Tracking  # its kernels and scipy.fft: the start of the window does without
+
         frames = range(min(t.frames[0] for t in tasks), max(t.frames[-1] for t in tasks) + 1) if tasks \
             else self.plate.frames
         groups: dict[tuple[Any, ...], tuple[TrackSettings, list[Track]]] = {}
@@ -65,6 +68,8 @@ class Work:
         self, planes: tuple[PlaneTrack, ...], progress: Progress, cancelled: Asked
     ) -> tuple[PlaneTrack, ...]:
         """Follow planes from their keys through the plate."""
+        from core.match.plane_tracker import plane_steps  # as above
+
         made, count = [], len(self.plate.frames)
         with self._opened(cancelled) as read:
             for number, plane in enumerate(planes):
