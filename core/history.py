@@ -92,9 +92,19 @@ class History(Generic[Value]):
             self._steps.append(_Step(name, document))
             self._cursor += 1
             crowded = sum(step.document is not None for step in self._steps) > 4 * self._keep + 8
-        self._start_packing()
+        self._start_packing(forget=True)
         if crowded:  # strokes come faster than they can be packed: memory matters more than this one's time
             self.flush()
+
+    def amend(self, document: Value) -> None:
+        """Put a value in the place of the current one, without a step; what can be undone and redone stays."""
+        with self._lock:
+            for place in (self._cursor - 1, self._cursor + 1):  # what leads here and from here is to be packed anew
+                if 0 <= place < len(self._steps) and self._steps[place].document is None:
+                    self._steps[place].document = self._rebuild(place)
+            self._steps[self._cursor].document = document
+            for step in self._steps[self._cursor : self._cursor + 2]:
+                step.change, step.packed, step.packed_bytes = None, False, 0
 
     def undo(self) -> Value:
         """Step back and return the value there (the current one when there is nothing to undo)."""
@@ -114,7 +124,7 @@ class History(Generic[Value]):
                 target.document = self._rebuild(place)
             self._cursor = place
             document = target.document
-        self._start_packing()
+        self._start_packing(forget=False)  # who only looks back and forth loses no step by it
         return document
 
     def flush(self) -> None:
@@ -144,28 +154,31 @@ class History(Generic[Value]):
         whole = {id(a): a.nbytes for step in self._steps if step.document is not None for _, a in leaves(step.document)}
         return sum(whole.values()) + sum(step.packed_bytes for step in self._steps)
 
-    def _start_packing(self) -> None:
+    def _start_packing(self, forget: bool) -> None:
         # always a new job, for the last one may just be ending; one that finds nothing to do costs nothing
         try:
-            self._packing = self._packer.submit(self._pack)
+            self._packing = self._packer.submit(self._pack, forget)
         except RuntimeError:  # closed
             self._packing = None
 
-    def _pack(self) -> None:
+    def _pack(self, forget: bool) -> None:
         while True:
             with self._lock:
                 far = self._farthest_whole()
                 if far is None:
-                    self._forget()
+                    if forget:
+                        self._forget()
                     return
                 place, near = far
                 older, newer = sorted((place, near))
-                step, before, after = self._steps[place], self._steps[older].document, self._steps[newer]
-                document = after.document
+                step, first, after = self._steps[place], self._steps[older], self._steps[newer]
+                before, document = first.document, after.document
             if not after.packed and before is not None and document is not None:
                 change = difference(before, document)  # outside the lock: both are immutable
                 size = change_bytes(change)
                 with self._lock:
+                    if first.document is not before or after.document is not document:
+                        continue  # amended meanwhile
                     after.change, after.packed, after.packed_bytes = change, True, size
             if not after.packed:  # cannot be, by the invariant; rather keep memory than turn for ever
                 return

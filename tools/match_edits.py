@@ -11,6 +11,7 @@ from core.document import FRAMES, Document, free_id
 from core.errors import UserError
 from core.image.plate import Plate
 from core.match import edits
+from core.match.outline import Mask
 from core.match.track import PlaneTrack, Track
 from core.record import freeze
 
@@ -209,6 +210,30 @@ def delete_shapes(document: Document, frame: int) -> Document:
     if len(planes) == len(document.planes) and len(masks) == len(document.masks):
         raise UserError("There is no plane or mask here that could be deleted.")
     changed: Document = document.replace(planes=planes, masks=masks)
+    return changed
+
+
+def delete_marks(document: Document, planes: tuple[int, ...], masks: tuple[int, ...]) -> Document:
+    """The document without these planes and masks; UserError for a locked one."""
+    gone: tuple[PlaneTrack | Mask, ...] = (
+        *(p for p in document.planes if p.id in planes), *(m for m in document.masks if m.id in masks))
+    locked = next((mark.name for mark in gone if mark.locked), None)
+    if locked is not None:
+        raise UserError(f"{locked} is locked; unlock it first.")
+    if not gone:
+        raise UserError("No plane or mask is chosen; click one in the list.")
+    changed: Document = document.replace(planes=tuple(p for p in document.planes if p.id not in planes),
+                                         masks=tuple(m for m in document.masks if m.id not in masks))
+    return changed
+
+
+def set_marks(document: Document, planes: tuple[int, ...], masks: tuple[int, ...], *, hidden: bool | None = None,
+              locked: bool | None = None) -> Document:
+    """The document with these planes and masks hidden or shown, locked or free."""
+    told = {name: value for name, value in (("hidden", hidden), ("locked", locked)) if value is not None}
+    changed: Document = document.replace(
+        planes=tuple(p.replace(**told) if p.id in planes else p for p in document.planes),
+        masks=tuple(m.replace(**told) if m.id in masks else m for m in document.masks))
     return changed
 
 

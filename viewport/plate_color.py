@@ -64,5 +64,24 @@ class PlateColors:
         return self._processors[color_space]
 
 
+def color_spaces(file: str | None = None) -> tuple[str, ...]:
+    """Names of the colour spaces of the configuration (``$OCIO`` by default, else the built-in one).
+
+    Raises
+    ------
+    UserError
+        The configuration cannot be read.
+    """
+    import PyOpenColorIO as ocio  # as above
+
+    name = os.environ.get("OCIO", "") if file is None else file
+    try:
+        config = ocio.Config.CreateFromFile(name) if name else ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
+    except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+        raise UserError(f"The colour configuration cannot be read ({' '.join(str(error).split())[:160]}); "
+                        "look at the OCIO variable.") from None
+    return tuple(space.getName() for space in config.getColorSpaces())
+
+
 def _three(pixels: NDArray[Any]) -> NDArray[Any]:
     return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels

@@ -36,6 +36,7 @@ from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
+from app.window.match.plate_panel import PlatePanel
 from app.window.match.track_list import TrackList
 from app.window.match.view import PlateView
 from app.window.memory import give_back_freed_memory
@@ -144,6 +145,7 @@ class MainWindow(QMainWindow):
             ("library", Section(PANELS["library"][0], PoseLibrary(self.desk), memory, "library")),
             ("rig", Section(PANELS["rig"][0], RigPanel(self.desk), memory, "rig")),
             ("respect", RespectPanel(self.desk, memory)),
+            ("plate", Section(PANELS["plate"][0], PlatePanel(self.desk, memory), memory, "plate")),
             ("tracks", Section(PANELS["tracks"][0], TrackList(self.desk), memory, "tracks")),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),

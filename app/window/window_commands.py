@@ -22,6 +22,7 @@ PANELS = {
     "library": ("Pose library", "Shows or hides the poses that are kept by name for later."),
     "rig": ("Rig", "Shows or hides the abstract controls and the constraints of the rig."),
     "pose_map": ("Pose map", "Shows or hides the map of pose space beside the model."),
+    "plate": ("Plates", "Shows or hides the list of plates, with film, crop, colours and what tracking sees."),
     "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
@@ -32,7 +33,7 @@ PANELS = {
 # panels that belong to one craft; the others are those of all
 PANEL_CRAFTS = {
     "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "rig": "pose",
-    "pose_map": "pose", "tracks": "match",
+    "pose_map": "pose", "tracks": "match", "plate": "match",
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
 AT_FIRST_HIDDEN = ("curves",)

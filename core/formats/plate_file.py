@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.formats.frame_decoder import FrameDecoder
 from core.image.frame_cache import DEFAULT_BUDGET, FrameCache
-from core.image.plate import Plate, frame_name
+from core.image.plate import FilmBack, Plate, frame_name
 
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".dpx", ".exr", ".ppm", ".pgm")
 MOVIES = (".mp4", ".mov", ".mkv", ".avi", ".m4v", ".webm", ".mxf", ".mpg")
@@ -65,6 +65,7 @@ def read_plate(path: str | Path, decoder: FrameDecoder, *, plate_id: int = 1) ->
         digest=_digest(file),
         missing=missing,
         focal_mm=facts.get("focal_mm"),
+        film_back=_film_back(facts, pixels.shape[1], pixels.shape[0]),
         pixel_aspect=float(np.clip(facts.get("pixel_aspect", 1.0) or 1.0, 0.1, 10.0)),
     )
 
@@ -113,6 +114,16 @@ class PlateFrames:
             )
         left, top, right, bottom = (side // self.proxy for side in plate.crop)
         return np.ascontiguousarray(pixels[top : size[0] - bottom, left : size[1] - right])
+
+
+def _film_back(facts: dict[str, Any], width: int, height: int) -> FilmBack | None:
+    """What the light fell on, from the focal length and the one alike on 36 x 24 mm, which is by the diagonal."""
+    focal, alike = facts.get("focal_mm"), facts.get("focal_35mm")
+    if not focal or not alike or not 0.01 <= focal <= 100_000.0:
+        return None
+    scale = float(np.hypot(36.0, 24.0) * focal / alike / np.hypot(width, height))
+    film = FilmBack(round(width * scale, 3), round(height * scale, 3))
+    return film if all(0.01 <= side <= 10_000.0 for side in film) else None
 
 
 def _movie(path: Path, decoder: FrameDecoder, plate_id: int) -> Plate:

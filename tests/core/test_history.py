@@ -103,6 +103,8 @@ def test_the_budget_forgets_the_oldest_steps_and_never_the_current_one():
     assert 3 < len(names) < 121
     assert names[-1] == "Comb 119"
     assert same_bits(history.jump(0), states[-len(names)])
+    history.flush()
+    assert history.names == names  # looking back forgets nothing
     assert same_bits(history.jump(len(names) - 1), states[-1])
     history.close()
 
@@ -162,6 +164,11 @@ class HistoryMachine(RuleBasedStateMachine):
         self.history.commit("Step", state)
         self.cursor += 1
         self.states[self.cursor :] = [state]
+
+    @rule(seed=st.integers(0, 99))
+    def amend(self, seed):
+        self.states[self.cursor] = stroked(self.states[self.cursor], seed, 0.3)
+        self.history.amend(self.states[self.cursor])
 
     @rule()
     def undo(self):

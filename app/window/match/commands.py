@@ -10,6 +10,7 @@ from core.document import Document
 from core.match.follow import Way
 from tools import match_edits
 from tools.match_edits import selected_tracks, shown_plate
+from tools.plate_edits import show_next_plate
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
@@ -35,6 +36,11 @@ def needs_track(desk: Desk) -> str | None:
 def needs_two(desk: Desk) -> str | None:
     """Two tracks must be selected."""
     return None if len(selected_tracks(desk.document)) > 1 else "Select two tracks or more; Shift adds."
+
+
+def needs_plates(desk: Desk) -> str | None:
+    """Another plate must be there than that in view."""
+    return None if len(desk.document.plates) > 1 else "There is no other plate: open one from the File menu."
 
 
 def frame_of(desk: Desk) -> int:
@@ -143,7 +149,8 @@ MATCH: tuple[Command, ...] = (
     _command("planes", "Track planes", "Follows every plane that is not locked or hidden through the whole plate.",
              lambda w: w.match.tracking.track_planes(), "core.match.plane_tracker.plane_steps", "Track planes",
              needs_plate, "corner pin planar"),
-    _command("delete_shapes", "Delete planes and masks", "Takes planes and masks seen here out; undo brings them back.",
+    _command("delete_shapes", "Delete all planes and masks here",
+             "Takes all planes and masks seen here out; the list of them deletes single ones.",
              lambda w: w.desk.edit("Delete shapes", match_edits.delete_shapes, frame_of(w.desk)),
              _edits("delete_shapes"), "Delete shapes", needs_plate, "roto remove"),
     _command("key", "Key here", "Makes the place of the selected tracks on this frame a key, with a new pattern.",
@@ -191,6 +198,9 @@ MATCH: tuple[Command, ...] = (
              _nudge(0.0, -0.1), _edits("nudge"), "Nudge", words="sub-pixel", repeats=True),
     _command("nudge_down", "Nudge down", "Moves the selected tracks a tenth of a pixel down on this frame.",
              _nudge(0.0, 0.1), _edits("nudge"), "Nudge", words="sub-pixel", repeats=True),
+    _command("next_plate", "Next plate", "Brings the next plate of the document into view, the first after the last.",
+             lambda w: w.desk.edit("Show plate", show_next_plate), "tools.plate_edits.show_next_plate", "Show plate",
+             needs_plates, "switch witness camera show"),
     _command("still", "Hold still at track", "Holds the picture still at the active track, so that slips are seen.",
              _still, _VIEW, enabled=needs_plate, words="stabilise stabilize lock view"),
     _command("natural", "One to one", "Shows one pixel of the plate on one pixel of the screen.",

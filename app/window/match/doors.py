@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject
@@ -18,6 +19,7 @@ from core.formats.tracks_json import Tracks
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
 from tools.match_edits import add_plate, add_tracks, shown_plate
+from tools.plate_edits import relink_plate
 
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
 
@@ -36,14 +38,6 @@ class MatchDoors(QObject):
 
     def open_plate(self, path: Path) -> None:
         """Look at a plate in a job and put it in view, in the craft of matchmoving."""
-
-        def work() -> Plate:
-            decoder = FrameDecoder()
-            try:
-                return read_plate(path.absolute(), decoder)
-            finally:
-                decoder.close()
-
         def done(plate: Plate) -> None:
             if not self._desk.edit("Open plate", add_plate, plate):
                 return
@@ -52,13 +46,39 @@ class MatchDoors(QObject):
             if plate.missing:
                 self._desk.said.emit(f"{plate.name} misses {len(plate.missing)} of its frames; tracks go on over them.")
 
+        self._look_at(path, done)
+
+    def ask_relink(self, plate_id: int) -> None:
+        """Let the artist choose a frame of a plate at its new place."""
+        kinds = [filter_of("Plates: a frame of a sequence, or a movie", (*PICTURES, *MOVIES)), "All files (*)"]
+        choose_file(self._parent, "Where is the plate now?", kinds, lambda path: self.relink(plate_id, path))
+
+    def relink(self, plate_id: int, path: Path) -> None:
+        """Look at a plate at its new place in a job, and take its files from there."""
+        known = next((p.digest for p in self._desk.document.plates if p.id == plate_id), "")
+
+        def done(found: Plate) -> None:
+            if self._desk.edit("Relink plate", relink_plate, plate_id, found) and found.digest != known:
+                self._desk.said.emit(f"{found.name} begins with another picture than before; see that it is the one.")
+
+        self._look_at(path, done)
+
+    def _look_at(self, path: Path, done: Callable[[Plate], None]) -> None:
+        def work() -> Plate:
+            decoder = FrameDecoder()
+            try:
+                return read_plate(path.absolute(), decoder)
+            finally:
+                decoder.close()
+
         self._desk.jobs.start(f"Look at {path.name}", lambda progress, cancelled: work(), done)
 
     def ask_import(self) -> None:
         """Let the artist choose a file of tracks."""
         self._plate()
         kinds = [filter_of("Tracks", tuple(s for s in SUFFIXES if s != ".py")), "All files (*)"]
-        choose_file(self._parent, "Import tracks", kinds, self.import_tracks)
+        choose_file(self._parent, "Import tracks", kinds,
+                    lambda path: self._desk.attempt(self.import_tracks, path))
 
     def import_tracks(self, path: Path) -> None:
         """Add the tracks of a file to the plate in view."""
@@ -80,7 +100,8 @@ class MatchDoors(QObject):
         plate = self._plate()
         if not any(t.plate_id == plate.id for t in self._desk.document.tracks):
             raise UserError("This plate has no tracks yet: place some first.")
-        choose_file(self._parent, "Export tracks", [filter_of("Tracks", SUFFIXES)], self.export_tracks, save=".json")
+        choose_file(self._parent, "Export tracks", [filter_of("Tracks", SUFFIXES)],
+                    lambda path: self._desk.attempt(self.export_tracks, path), save=".json")
 
     def export_tracks(self, path: Path) -> None:
         """Write the tracks of the plate in view; hidden ones are left out."""

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from app.window.desk import Desk
 from app.window.fields.choice_bar import ChoiceBar
 from app.window.match.marks import GOOD, POOR, UNLIKE, errors_of
+from app.window.match.shape_list import ShapeList
 from app.window.pose.graph import Graph, Line
 from app.window.sections import Row
 from app.window.theme import look_of
@@ -62,7 +63,8 @@ class TrackList(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
-        for widget in (self.said, self.list, Row(_GRAPH.label, self.kind), self.graph):
+        self.shapes = ShapeList(desk)
+        for widget in (self.said, self.list, self.shapes, Row(_GRAPH.label, self.kind), self.graph):
             column.addWidget(widget)
         self._filling = False
         self._seen: tuple[object, ...] = ()
@@ -85,8 +87,14 @@ class TrackList(QWidget):
         document = self.desk.document
         if self.desk.session.stroking:
             return
-        seen = (document.tracks, document.plates, document.track_selection)
+        seen = (document.tracks, document.plates)
         if len(seen) == len(self._seen) and all(a is b for a, b in zip(seen, self._seen, strict=True)):
+            self._filling = True  # the rows stay: one of them may be under a press of the hand
+            try:
+                self.list.choose(document.track_selection)
+            finally:
+                self._filling = False
+            self.plot()
             return
         self._seen = seen
         plate = shown_plate(document)
@@ -131,7 +139,7 @@ class TrackList(QWidget):
     def _selected(self) -> None:
         if not self._filling:
             ids = tuple(int(item.data(0, ROLE)) for item in self.list.selectedItems())
-            self.desk.edit("Select tracks", select_tracks, ids)
+            self.desk.attempt(self.desk.session.amend, "Select tracks", select_tracks, ids)
 
     def _clicked(self, item: QTreeWidgetItem) -> None:
         plate = shown_plate(self.desk.document)
@@ -196,9 +204,14 @@ class _Tracks(QTreeWidget):
                     item.setForeground(place, theme.colour("trouble_text"))
             items.append(item)
         self.addTopLevelItems(items)
-        for item in items:
-            item.setSelected(item.data(0, ROLE) in chosen)
+        self.choose(chosen)
         self.updateGeometry()
+
+    def choose(self, chosen: tuple[int, ...]) -> None:
+        """Show these tracks as selected."""
+        for row in range(self.topLevelItemCount()):
+            item = self.topLevelItem(row)
+            item.setSelected(item.data(0, ROLE) in chosen)
 
 
 class _Spans(QStyledItemDelegate):

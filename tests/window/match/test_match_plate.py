@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import cv2
@@ -13,6 +14,8 @@ from PySide6.QtTest import QTest
 
 from app.window.commands import Command
 from app.window.match.commands import MATCH
+from app.window.match.plate_panel import PlatePanel
+from app.window.match.track_list import TrackList
 from core.document import Document
 from core.image.plate import Plate
 from core.image.plate_view import view_points
@@ -105,7 +108,7 @@ def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Ho
     document = edits.put_tracks(edits.add_plate(host.desk.document, film), tracks)
     shape = freeze(np.array([[[5.0, 5.0], [50.0, 5.0], [5.0, 50.0]]]))
     mask = Mask(id=1, name="m", frames=freeze(np.array([11], np.int32)), points=shape, plate_id=1)
-    document = document.replace(masks=(mask,))
+    document = document.replace(masks=(mask,), plates=(*document.plates, film.replace(id=2, hidden=True)))
     host.desk.session.commit("Tracks", edits.select_tracks(document, (1, 2)))
     host.desk.set_workspace(frame=15.0)
     if command.name in BEFORE:
@@ -176,3 +179,67 @@ def test_cancelled_tracking_leaves_all_as_it_was_and_a_plane_is_pinned(opened: O
     pinned = carried_points(plane, FIRST + COUNT - 1, plane.corners)
     assert pinned is not None
     assert np.abs(pinned - plane.corners - STEP * (COUNT - 1)).max() < 0.2
+
+
+def test_plates_are_listed_told_of_relinked_and_shown(opened: Opened, plate: Path, tmp_path: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk, panel = hand.window.desk, hand.window.findChild(PlatePanel)
+    assert panel.isVisible()
+    panel.mix.fields["channels"].enter("grey")
+    panel.mix.fields["denoise"].enter(0.7)
+    panel.form.fields["left"].enter(20)
+    panel.form.fields["film_width"].enter(24.0)
+    panel.form.fields["film_height"].enter(16.0)
+    panel.form.fields["pixel_aspect"].enter(2.0)
+    (first,) = desk.document.plates
+    assert (first.mix.channels, first.mix.denoise, first.crop) == ("grey", 0.7, (20, 0, 0, 0))
+    assert (tuple(first.film_back), first.pixel_aspect) == ((24.0, 16.0), 2.0)
+    hand.until(lambda: len(panel.space.choices) > 1)
+    panel.space.enter(panel.space.choices[-1])
+    assert desk.document.plates[0].color_space == panel.space.choices[-1]
+    panel.form.fields["left"].enter(5000)
+    hand.until(lambda: panel.form.fields["left"].value() == 20)
+    moved = tmp_path / "elsewhere"
+    shutil.copytree(plate, moved)
+    hand.window.match.doors.relink(first.id, moved)
+    hand.until(lambda: "elsewhere" in desk.document.plates[0].path)
+    assert desk.document.plates[0].crop == (20, 0, 0, 0)
+    hand.window.opening.open(plate)
+    hand.until(lambda: len(desk.document.plates) == 2)
+    panel.form.fields["offset"].enter(7)
+    assert (desk.document.first_frame, desk.document.last_frame) == (FIRST + 7, FIRST + COUNT + 6)
+    assert panel.list.topLevelItemCount() == 2
+    row = panel.list.visualItemRect(panel.list.topLevelItem(0)).center()
+    QTest.mouseClick(panel.list.viewport(), LEFT, pos=row)
+    hand.until(lambda: edits.shown_plate(desk.document).id == first.id)
+    assert (desk.document.first_frame, desk.document.last_frame) == (FIRST, FIRST + COUNT - 1)
+    hand.window.commands.run("match.next_plate")
+    assert edits.shown_plate(desk.document).id != first.id
+    QTest.mouseClick(panel.buttons["delete"], LEFT)
+    assert [p.id for p in desk.document.plates] == [first.id]
+    assert edits.shown_plate(desk.document).id == first.id
+
+
+def test_a_click_in_the_list_is_no_step_and_shapes_are_deleted_one_by_one(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk, tracks = hand.window.desk, hand.window.findChild(TrackList)
+    made = tuple(keyed_track(n, f"t{n}", np.array([[FIRST, 50.0 + 30 * n, 60.0]])) for n in (1, 2))
+    desk.edit("Tracks", edits.add_tracks, made, desk.document.plates[0].id)
+    steps = desk.session.history.names
+    row = tracks.list.visualItemRect(tracks.list.topLevelItem(0)).center()
+    QTest.mouseClick(tracks.list.viewport(), LEFT, pos=row)
+    assert len(desk.document.track_selection) == 1
+    assert desk.session.history.names == steps
+    here = desk.document.plates[0].id
+    masks = tuple(
+        Mask(id=n, name=f"m{n}", frames=freeze(np.array([FIRST], np.int32)), plate_id=here,
+             points=freeze(np.array([[[9.0, 9.0], [40.0, 9.0], [9.0, 40.0]]]))) for n in (1, 2))
+    desk.edit("Masks", lambda document: document.replace(masks=masks))
+    shapes = tracks.shapes
+    hand.until(shapes.isVisible)
+    shapes.list.topLevelItem(1).setSelected(True)
+    QTest.mouseClick(shapes.buttons["lock"], LEFT)
+    assert [m.locked for m in desk.document.masks] == [False, True]
+    QTest.mouseClick(shapes.buttons["lock"], LEFT)
+    QTest.mouseClick(shapes.buttons["delete"], LEFT)
+    assert [m.id for m in desk.document.masks] == [1]
