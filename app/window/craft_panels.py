@@ -102,7 +102,9 @@ class ToolPanel(_Panel):
         tool = self.desk.session.tool
         if self.title != tool.label:
             self.set_title(tool.label)
-        self.show_record(tool.name, tool.params, Setting(unit=self.unit))
+        groom = self.desk.groom
+        maps = () if groom is None else tuple(m.name for m in groom.maps if m.values is not None)
+        self.show_record(tool.name, tool.params, Setting(unit=self.unit, maps=maps))
 
     def edited(self, record: Record, final: bool) -> None:
         params = {name: getattr(record, name) for name in record.__struct_fields__}

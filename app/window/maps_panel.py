@@ -1,4 +1,4 @@
-"""The maps of the active groom: loaded, deleted, given to density and length, shown on the skin and laid flat."""
+"""The maps of the active groom: made, painted, loaded, given to density and length, shown on the skin, laid flat."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ from app.window.icons import paint_icon
 from app.window.sections import Row
 from app.window.theme import look_of, text_font
 from app.window.uv_view import UvView
-from core.document import Document
+from core.document import Document, find_groom
 from core.groom.groom import COAT_FIELDS, Map
 from core.workspace import Workspace
-from tools.document_edits import map_from_image, remove_map, set_coat, set_map
+from tools.document_edits import add_flat_map, map_from_image, remove_map, set_coat, set_map
+from tools.map_edits import DENSITY, ROLES, paintable_copy, painted_name
 
 NONE = "none"
-ROLES = ("density_map", "length_map")  # fields of the coat that name a map
+PAINT = "paint_map"  # the tool
 
 
 class _Rows(QStyledItemDelegate):
@@ -119,7 +120,16 @@ class MapsPanel(QWidget):
         self._filling = False
         self.list = _List(self)
         self.list.setItemDelegate(_Rows(self))
-        self.load_button = QPushButton("Load image…")
+        self._before: tuple[str | None, bool] = (None, True)  # map and hair of the view before painting
+        self._painting: str | None = None  # the map shown for the paint tool
+        self.paint_button = QPushButton("Paint")
+        self.paint_button.setToolTip("Takes the brush that paints the chosen map on the skin; without any map a first "
+                                     "one for the density. Hair steps aside meanwhile.")
+        self.paint_button.clicked.connect(self.paint)
+        self.new_button = QPushButton("New")
+        self.new_button.setToolTip("Makes a map that is 1 everywhere, one number per vertex, ready to be painted on.")
+        self.new_button.clicked.connect(self.new)
+        self.load_button = QPushButton("Load…")
         self.load_button.setToolTip("Reads a PNG, JPEG or TIFF as a map over the UVs, in place of one of its name.")
         self.load_button.clicked.connect(self.ask)
         self.delete_button = QPushButton("Delete")
@@ -129,8 +139,8 @@ class MapsPanel(QWidget):
         self.view = UvView(desk)
         buttons = QHBoxLayout()
         buttons.setSpacing(4)
-        buttons.addWidget(self.load_button, 1)
-        buttons.addWidget(self.delete_button)
+        for button in (self.paint_button, self.new_button, self.load_button, self.delete_button):
+            buttons.addWidget(button, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
@@ -197,7 +207,8 @@ class MapsPanel(QWidget):
                 box.setEnabled(groom is not None)
         finally:
             self._filling = False
-        self.load_button.setEnabled(groom is not None)
+        for button in (self.load_button, self.new_button, self.paint_button):
+            button.setEnabled(groom is not None)
         self.delete_button.setEnabled(bool(names))
         self.view.show_map(self.chosen)
         self.list.viewport().update()
@@ -219,6 +230,27 @@ class MapsPanel(QWidget):
 
         desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: map_from_image(path), put, owner=self)
 
+    def new(self) -> None:
+        """Make a flat map: the first for the density, others for whatever they are given to."""
+        groom = self._desk.groom
+        if groom is not None and self._desk.edit(
+                "New map", add_flat_map, groom.id, "map" if groom.map(DENSITY) else DENSITY):
+            self._choose(find_groom(self._desk.document, groom.id).maps[-1].name)
+
+    def paint(self) -> None:
+        """Take the brush for the chosen map; an image is copied to a map per vertex first."""
+        groom, name, desk = self._desk.groom, self.chosen, self._desk
+        if groom is None:
+            return
+        item = None if name is None else groom.map(name)
+        if name is not None and item is not None and item.image is not None:
+            copy = f"{name} painted"
+            if groom.map(copy) is None and not desk.edit("Paintable map", paintable_copy, groom.id, name, copy):
+                return
+            name = copy
+            self._choose(name)
+        desk.choose(PAINT, map=name)
+
     def delete(self) -> None:
         """Take the chosen map out of the groom."""
         groom, name = self._desk.groom, self.chosen
@@ -237,8 +269,32 @@ class MapsPanel(QWidget):
             self.list.setCurrentItem(item)
 
     def _chosen(self, name: str) -> None:
-        if not self._filling:
-            self.view.show_map(name or None)
+        if self._filling:
+            return
+        self.view.show_map(name or None)
+        item = None if self._desk.groom is None else self._desk.groom.map(name)
+        if item is not None and item.values is not None and self._desk.workspace.tool == PAINT:
+            self._desk.choose(PAINT, map=name)
+
+    def _follow_tool(self) -> None:
+        """Show the map that is painted, and no hair over it, while its brush is in the hand."""
+        groom, workspace = self._desk.groom, self._desk.workspace
+        view, painting = workspace.view, self._painting
+        wanted = None
+        if workspace.tool == PAINT and groom is not None:
+            wanted = painted_name(groom, workspace.params.get(PAINT, {}).get("map"))
+        if wanted == painting:
+            return
+        self._painting = wanted
+        if wanted is not None:
+            if painting is None:
+                self._before = view.map, view.hair
+                view = view.replace(hair=False)
+            view = view.replace(map=wanted)
+        else:
+            seen, hair = self._before
+            view = view.replace(map=seen if view.map == painting else view.map, hair=hair or view.hair)
+        self._desk.set_workspace(view=view)
 
     def _assign(self, role: str, place: int) -> None:
         groom = self._desk.groom
@@ -256,6 +312,8 @@ class MapsPanel(QWidget):
             self.refresh()
         if old.view.map != new.view.map:
             self.list.viewport().update()
+        if (old.tool, old.groom) != (new.tool, new.groom) or old.params.get(PAINT) is not new.params.get(PAINT):
+            self._follow_tool()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if self._pictures(event):

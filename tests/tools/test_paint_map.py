@@ -67,6 +67,14 @@ def test_pressure_keys_and_softening_do_what_the_hint_says():
     assert 0.25 < density(s)[np.argmin(np.hypot(*(front(s)[0] - 200).T) - front(s)[1])] <= 0.75
 
 
+def test_far_side_too_paints_all_that_the_ring_covers():
+    s = session()
+    s.choose("paint_map", through=True, **HARD)
+    s.hand.stroke(sight(), pointers([(200, 190)]))
+    away = np.hypot(*(front(s)[0] - (200, 190)).T)
+    np.testing.assert_array_equal(density(s) == 0.0, away < 30.0)
+
+
 def test_symmetry_paints_both_sides_alike():
     s = session()
     s.set_workspace(respect=Respect(symmetry=True))

@@ -209,3 +209,24 @@ def test_without_a_groom_the_panel_waits(desk: Desk, panel: MapsPanel, qtbot: Qt
     assert not panel.load_button.isEnabled()
     assert not panel.roles["density_map"].isEnabled()
     assert panel.view.words == NO_GROOM
+
+
+def test_paint_takes_the_brush_for_the_map_and_shows_it_without_hair_until_another_tool(
+    desk: Desk, panel: MapsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    before = names(panel)
+    qtbot.mouseClick(panel.new_button, Qt.MouseButton.LeftButton)
+    made = names(panel)[-1]
+    assert len(names(panel)) == len(before) + 1
+    qtbot.mouseClick(panel.paint_button, Qt.MouseButton.LeftButton)
+    assert desk.session.tool.name == "paint_map"
+    assert (desk.session.tool.params.map, panel.overlay, desk.workspace.view.hair) == (made, made, False)
+    panel.load(picture(tmp_path))
+    idle(desk, qtbot)
+    assert panel.chosen == picture(tmp_path).stem
+    assert panel.overlay == made, "an image cannot be painted on before it is copied"
+    qtbot.mouseClick(panel.paint_button, Qt.MouseButton.LeftButton)
+    copy = f"{picture(tmp_path).stem} painted"
+    assert (desk.session.tool.params.map, panel.overlay, panel.chosen) == (copy, copy, copy)
+    desk.choose("comb")
+    assert (panel.overlay, desk.workspace.view.hair) == (None, True)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from core.falloff import falloff
 from core.field import field
 from core.pose.sculpt.mask import blur_mask, paint_mask
-from core.pose.sculpt.ring import ring_at
-from core.pose.sculpt.surface import sculpt_surface
+from core.pose.sculpt.ring import Ring, ring_at
+from core.pose.sculpt.surface import SculptSurface, sculpt_surface
 from core.record import freeze
 from tools.brush import RingStroke
 from tools.groom.craft import GroomGround
 from tools.ring import BrushParams
+from tools.screen import FLAT
 from tools.tool import Pointer, Stroke, Tool, Turn
 
 PASS = 4.0  # share of the way to the value that a way of one radius goes at strength 1: a pass is all of it
@@ -67,13 +70,31 @@ class PaintStroke(RingStroke[PaintMapParams, GroomGround, Values]):
         dabs = self.dabs()
         share = min(PASS * self.dose / len(dabs), 1.0)
         for dab in dabs:
-            hit = ground.hit(dab)
-            if hit is None:
+            ring = self._ring(surface, dab)
+            if ring is None:
                 continue
-            metres = self.radius / ground.pixels_per_metre(hit.point)
-            ring = ring_at(surface, ground.skin.points, hit.point, metres, p.falloff)
             if p.how == "soften":
                 values = blur_mask(surface, values, ring, share, SOFTENED)
             elif len(ring.sites):
                 values = paint_mask(surface, values, ring, goal, share)
         return freeze(values)
+
+    def _ring(self, surface: SculptSurface, dab: Pointer) -> Ring | None:
+        """What a dab touches: the skin joined to where it falls, or all that the ring covers on the screen."""
+        p, ground = self.params, self.ground
+        if p.through:
+            away = np.linalg.norm(self._pixels - (dab.x, dab.y), axis=1) / max(self.radius, 1e-9)
+            weights = falloff(away, p.falloff, FLAT)
+            sites = np.flatnonzero((weights > 0.0) & (surface.site == np.arange(len(weights)))).astype(np.int32)
+            return Ring(sites, weights[sites].astype(np.float64), np.zeros(3), self.radius)
+        hit = ground.hit(dab)
+        if hit is None:
+            return None
+        metres = self.radius / ground.pixels_per_metre(hit.point)
+        return ring_at(surface, ground.skin.points, hit.point, metres, p.falloff)
+
+    @cached_property
+    def _pixels(self) -> NDArray[np.float64]:
+        """Where the vertices (V, 2) are on the screen, infinitely far away behind the eye."""
+        pixels, depth = self.ground.view.pixels(self.ground.skin.points)
+        return np.where(depth[:, None] > 0.0, pixels, np.inf)
