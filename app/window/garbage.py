@@ -27,18 +27,19 @@ class Garbage(QObject):
         self._timer.start()
 
     def look(self) -> None:
-        """Collect as deep as Python would by now; next to nothing to do while nothing was made.
+        """Collect what is young, and every so often everything; next to nothing to do while nothing was made.
 
-        The first look leaves alone for ever what is there by then: the imports.
+        The first look leaves alone for ever what is there by then: the imports. So everything else is little and is
+        looked over long before Python would: closed windows and documents lie in the oldest generation.
         """
         if not self._frozen:
             self._frozen = True
             gc.freeze()  # going over all of it each time would stall the hand
-        count, limit = gc.get_count(), gc.get_threshold()
-        for generation in (2, 1, 0):
-            if count[generation] > limit[generation]:
-                gc.collect(generation)
-                return
+        (young, times, _), (most, often, _) = gc.get_count(), gc.get_threshold()
+        if times > often:
+            gc.collect()
+        elif young > most:
+            gc.collect(0)
 
     def stop(self) -> None:
         """Leave it to Python again."""

@@ -216,23 +216,11 @@ def open_window(wish: Wish, loaded: LoadedSettings) -> MainWindow:
         window.opening.open_demo()
     if wish.screenshot is None:
         window.offer_lost_work()
-    _collect_here(window)
+    window.desk.session_replaced.connect(gc.collect)  # what hung on the old document goes with it
     # what draws comes with every kernel of a coat: it is loaded while the artist looks where to begin
     window.desk.jobs.start(
         "Loading", lambda progress, cancelled: importlib.import_module("app.window.live_picture"), lambda module: None)
     return window
-
-
-def _collect_here(window: MainWindow) -> None:
-    """Rings of Python objects may hold widgets, which only this thread may let go of: collect them here alone.
-
-    Jobs on other threads would collect them there, of which Qt dies. What the start has made is left out, so that a
-    collection takes a few milliseconds.
-    """
-    gc.freeze()
-    gc.disable()
-    window.viewport.settled.connect(gc.collect)
-    window.desk.session_replaced.connect(gc.collect)
 
 
 def _plugin_folders(loaded: LoadedSettings) -> tuple[Path, ...] | None:

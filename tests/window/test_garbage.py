@@ -43,3 +43,18 @@ def test_other_threads_collect_nothing_and_the_window_does(qtbot: QtBot) -> None
     garbage.stop()
     assert gc.isenabled() == was_on
     assert gc.get_freeze_count() == 0
+
+
+def test_a_ring_that_was_alive_for_long_goes_after_a_dozen_looks() -> None:
+    garbage = Garbage()
+    garbage.look()
+    died: list[str] = []
+    ring = Ring(died)
+    gc.collect()  # it lives on, and is old by now
+    del ring
+    kept: list[list[int]] = []
+    for _ in range(12):
+        kept += ([number] for number in range(2 * gc.get_threshold()[0]))
+        garbage.look()
+    assert died
+    garbage.stop()
