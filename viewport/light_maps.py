@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from viewport.drawables.mesh import MeshDrawable
 from viewport.drawables.strands import CoatDrawable
 from viewport.outline import extent
 from viewport.scene import Scene, direction
@@ -80,12 +79,14 @@ class LightMaps:
         self.sums_target = ctx.framebuffer([self.sums])
 
     def draw(
-        self, scene: Scene, toward: NDArray[np.float64], meshes: Sequence[MeshDrawable], coats: Sequence[CoatDrawable],
+        self, scene: Scene, toward: NDArray[np.float64], cast_shadows: Callable[[NDArray[np.float64]], object],
+        coats: Sequence[CoatDrawable],
         outline: NDArray[np.float32], shares: Sequence[float] = (),
     ) -> Generator[None, None, dict[str, Any]]:
         """Draw the maps in steps; returns the uniforms of lighting.glsl that describe them.
 
-        outline : of the scene, (M, 3). shares : of each coat, see :meth:`CoatDrawable.draw_opacity`; 1 when not given.
+        cast_shadows : draws the depth of all that is not hair. outline : of the scene, (M, 3).
+        shares : of each coat, see :meth:`CoatDrawable.draw_opacity`; 1 when not given.
         """
         ctx = self.ctx
         matrix, size = light_frame(outline, toward)
@@ -98,9 +99,7 @@ class LightMaps:
         for target in (self.skin_target, self.first_target):
             target.use()
             target.clear(depth=1.0)
-            for mesh in meshes:
-                if not mesh.surface.ghost:
-                    mesh.draw_depth(matrix)
+            cast_shadows(matrix)
         yield
         self.first_target.use()
         ctx.enable(moderngl.DEPTH_TEST)

@@ -219,8 +219,8 @@ class Moving:
             for coat, drawn in self._sparse:
                 narrower = mean_width(coat.look) / max(mean_width(drawn.look), 1e-12)
                 shares.append(stands_for(coat, self._hairs) * narrower)
-            drawables, outline = self.renderer.solids.meshes, self.renderer.outline.of(scene)
-            self._lighting = _finish(self.light_maps.draw(scene, toward, drawables, self.coats, outline, shares))
+            cast, outline = self.renderer.solids.cast_shadows, self.renderer.outline.of(scene)
+            self._lighting = _finish(self.light_maps.draw(scene, toward, cast, self.coats, outline, shares))
             self._light_key, self._toward = key, toward
         return self._lighting
 

@@ -58,7 +58,7 @@ class Outline:
         """See :func:`outline_points`."""
         key = (
             *(surface.points for surface in scene.surfaces), *(coat.points for coat in scene.coats),
-            *(lines.points for lines in scene.guides),
+            *(lines.points for lines in scene.guides), *(mesh.points for mesh in scene.feathers),
         )
         if not same(self._key, key):
             self._key, self._points = key, outline_points(scene)

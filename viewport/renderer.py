@@ -114,7 +114,7 @@ class Renderer:
         """Upload, draw the light's maps and shade every point, in steps; the done part 0 .. 1."""
         yield from self._upload(scene)
         toward = light_directions(scene, camera)
-        maps = self.light_maps.draw(scene, toward["key"], self.solids.meshes, self.coats, self.outline.of(scene))
+        maps = self.light_maps.draw(scene, toward["key"], self.solids.cast_shadows, self.coats, self.outline.of(scene))
         lighting = yield from _told(maps, 0.3)
         uniforms = camera_uniforms(scene, camera, size) | lighting | light_uniforms(scene, toward)
         for things in (self.coats, self.guides):

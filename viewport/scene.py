@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from core.feather.pieces import FeatherMesh
+
 Color = tuple[float, float, float]
 MOST_BOUNDING, ALONG = 5_000, 5  # strands, and points of each, looked at to find how large the scene is
 Floats = NDArray[np.float32]
@@ -130,6 +132,7 @@ class Scene(NamedTuple):
     lights: Lights = Lights()
     background: tuple[Color, Color] = ((0.2275, 0.2314, 0.2471), (0.1216, 0.1255, 0.1373))
     exposure: float = 1.0
+    feathers: tuple[FeatherMesh, ...] = ()
 
 
 def thinned(coat: Coat, most: int) -> Coat:
@@ -173,7 +176,7 @@ def root_normals(points: np.ndarray, surface: Surface) -> Floats:
 
 def all_points(scene: Scene) -> list[np.ndarray]:
     """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (some of many)."""
-    found = [surface.points for surface in scene.surfaces]
+    found = [surface.points for surface in scene.surfaces] + [mesh.points for mesh in scene.feathers]
     for points in [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]:
         axis = 2 if points.shape[1] == 3 else 1
         points = points[:: 1 + len(points) // MOST_BOUNDING]

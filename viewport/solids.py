@@ -1,4 +1,4 @@
-"""Everything that is not hair: meshes in the manner wanted, their edges, ghosts, and the ground."""
+"""Everything that is not hair: meshes in the manner wanted, their edges, ghosts, feathers, and the ground."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from core.camera import Camera
 from core.workspace import ViewOptions
+from viewport.drawables.feathers import FeatherDrawable, FeatherPrograms
 from viewport.drawables.grid import GridDrawable
 from viewport.drawables.mesh import GHOST_OPACITY, MeshDrawable, MeshPrograms
 from viewport.drawables.strands import ABSORPTION
@@ -40,10 +41,24 @@ class Solids:
         self.programs = MeshPrograms(ctx)
         self.grid = GridDrawable(ctx)
         self.meshes: list[MeshDrawable] = []
+        self.feather_programs: FeatherPrograms | None = None  # made with the first feather
+        self.feathers: list[FeatherDrawable] = []
 
     def upload(self, scene: Scene) -> None:
         """Bring the surfaces onto the card."""
         self.meshes = matched(self.meshes, scene.surfaces, lambda s: MeshDrawable(self.ctx, self.programs, s))
+        if scene.feathers and self.feather_programs is None:
+            self.feather_programs = FeatherPrograms(self.ctx)
+        programs = self.feather_programs
+        self.feathers = matched(self.feathers, scene.feathers, lambda f: FeatherDrawable(self.ctx, programs, f))
+
+    def cast_shadows(self, clip_from_world: NDArray[np.float64]) -> None:
+        """Draw the depth of all that keeps light off the rest."""
+        for mesh in self.meshes:
+            if not mesh.surface.ghost:
+                mesh.draw_depth(clip_from_world)
+        for feathers in self.feathers:
+            feathers.draw_depth(clip_from_world)
 
     def draw(
         self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, uniforms: dict[str, Any],
@@ -63,6 +78,8 @@ class Solids:
         solid = [mesh for mesh in self.meshes if not mesh.surface.ghost]
         if options.shading != "wire":
             self._fill(solid, scene, uniforms, options.shading, quick)
+        for feathers in self.feathers:
+            feathers.draw(uniforms)
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         if options.wire or options.shading in ("wire", "lines"):
@@ -99,7 +116,8 @@ class Solids:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        things: list[Any] = [*self.meshes, self.grid, self.programs]
+        things: list[Any] = [*self.meshes, *self.feathers, self.grid, self.programs]
+        things += [] if self.feather_programs is None else [self.feather_programs]
         for thing in things:
             thing.release()
-        self.meshes = []
+        self.meshes, self.feathers, self.feather_programs = [], [], None

@@ -67,10 +67,8 @@ def strips(count: int, points: int) -> NDArray[np.int32]:
 def grid_triangles(rows: int, columns: int) -> NDArray[np.int32]:
     """Triangles of a grid of vertices, row by row, that face the side from which rows run up and columns right."""
     at = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1, 1)
-    return np.asarray(
-        np.concatenate([at + np.array([0, 1, columns + 1]), at + np.array([0, columns + 1, columns])], axis=-1).reshape(-1, 3),
-        np.int32,
-    )
+    quads = np.concatenate([at + np.array([0, 1, columns + 1]), at + np.array([0, columns + 1, columns])], axis=-1)
+    return np.asarray(quads.reshape(-1, 3), np.int32)
 
 
 def tangents(curves: NDArray[Any]) -> NDArray[Any]:
