@@ -30,8 +30,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Find the camera, and where the tracked points are, from their tracks."""
-    if lens not in LENSES:
-        raise typer.BadParameter(f"choose one of {', '.join(LENSES)}", param_hint="--lens")
+    asked = options_of(focal_px, free_focal, zoom, nodal, lens)
     outputs = list(output or ())
     check_outputs(outputs, report)
     telling = Report(as_json)
@@ -42,7 +41,7 @@ def command(
             plate = plate or given.size
             if plate is None:
                 raise UserError(f"{tracks.name} does not say how large the plate is; give --size 1920x1080.")
-        done = solve_tracks(given.tracks, plate, options_of(focal_px, free_focal, zoom, nodal, lens), outputs, report, telling, tracks.stem)
+        done = solve_tracks(given.tracks, plate, asked, outputs, report, telling, tracks.stem)
     for words in done.told.warnings:
         telling.note(words)
     telling.done(done.result, done.lines)
@@ -50,6 +49,8 @@ def command(
 
 def options_of(focal: float | None, free_focal: bool, zoom: bool, nodal: bool, lens: str) -> Options:
     """What a solve is asked, of the options of a command; `lens` is none or a model."""
+    if lens not in LENSES:
+        raise typer.BadParameter(f"choose one of {', '.join(LENSES)}", param_hint="--lens")
     bent = lens != "none"
     return Options(focal, free_focal, zoom, bent, nodal, lens if bent else "brown")
 

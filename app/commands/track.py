@@ -8,7 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from app.commands.solve import options_of
 from app.report import Report, peak_megabytes
+from app.solving import check_outputs, solve_tracks
 from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
@@ -40,6 +42,14 @@ def command(
     contrast: Annotated[float, typer.Option(min=0.0, max=2000.0, help="Even out contrast over so many pixels; for dark plates.")] = 0.0,
     frames: Annotated[str | None, typer.Option(help="First and last frame, as 1001-1100; all of them otherwise.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page with curves and pictures: .html.")] = None,
+    solved: Annotated[bool, typer.Option("--solve", help="Solve the camera from the tracks; -o says where it goes.")] = False,
+    output: Annotated[list[Path] | None, typer.Option("-o", "--output", help="Where the solved camera goes, the suffix says how; more than one may be given.")] = None,
+    solve_report: Annotated[Path | None, typer.Option(help="Write a page that says how good the solve is: .html.")] = None,
+    focal_px: Annotated[float | None, typer.Option(min=1.0, max=1e7, help="The focal length in pixels, for --solve; found otherwise.")] = None,
+    free_focal: Annotated[bool, typer.Option("--free-focal", help="Find the focal length too, from --focal-px if it is given.")] = False,
+    zoom: Annotated[bool, typer.Option("--zoom", help="The focal length changes over the shot.")] = False,
+    lens: Annotated[str, typer.Option(help="Find the bend of the lens too: brown, fisheye, radial4, anamorphic4.")] = "none",
+    nodal: Annotated[bool, typer.Option("--nodal", help="The camera only turns, as on a tripod.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Follow points through a plate: given keys, features found by themselves, or both."""
@@ -48,11 +58,15 @@ def command(
     if model != "auto" and model not in MODELS:
         raise typer.BadParameter(f"choose auto or one of {', '.join(MODELS)}", param_hint="--model")
     _check_outputs(tracks_out, report)
+    if (output or solve_report) and not solved:
+        raise typer.BadParameter("-o and --solve-report are of a solved camera: add --solve", param_hint="--output")
+    asked = options_of(focal_px, free_focal, zoom, nodal, lens)
+    check_outputs(output or (), solve_report)
     telling = Report(as_json)
     workers, decoder = Workers(), FrameDecoder()
     warnings: list[str] = []
     try:
-        with telling.working(total=3):
+        with telling.working(total=5 if solved else 3):
             with telling.stage("read", "looking at the plate"):
                 film = read_plate(plate, decoder)
                 span = _span(frames, film.frames)
@@ -88,6 +102,11 @@ def command(
 
                     with atomic_write(report) as beside:
                         write_report(beside, film, made, settings, source.get, warnings)
+            done = None
+            if solved:
+                done = solve_tracks(
+                    made, (film.width, film.height), asked, output or (), solve_report, telling, film.name, source.get)
+                warnings += done.told.warnings
         source.close()
     finally:
         decoder.close()
@@ -101,7 +120,11 @@ def command(
         "ms_per_track_frame": round(1e3 * seconds / max(1, tracking.observations), 4), "warnings": warnings, "outputs": written,
         "peak_mb": peak_megabytes(),
     }
+    if done is not None:
+        result["solve"] = {key: done.result[key] for key in done.result.keys() - {"seconds", "peak_mb", "outputs"}}
+        written += done.result["outputs"]
     lines = [f"{len(made)} tracks, {result['observations']:,} points on frames {span[0]} to {span[-1]}, {seconds:.1f} s", *written]
+    lines += done.lines if done is not None else []
     telling.done(result, lines)
 
 

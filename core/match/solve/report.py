@@ -35,6 +35,7 @@ NOISE, TOO_NOISY = 1.3, 3.0  # residuals over the noise of the tracks: said; ref
 FOCAL_SIGMA = 0.03
 PATH, NO_PATH = 0.03, 0.3  # uncertainty of the path over its size
 OUT, TOO_MANY_OUT = 0.4, 0.49  # share of the tracks that do not fit
+APART, MOVES = 1.5, 2.0  # of the typical error; of the doubt of the path: worth a look
 FLAT = 4.0  # standard deviations of the points: a plane as well as can be told
 
 
@@ -46,6 +47,19 @@ class Test(NamedTuple):
     better: float
 
 
+class Fix(NamedTuple):
+    """What leaving out a track or a frame would do, told from the last normal equations without solving again.
+
+    kind : "track" or "frame". row : of it. rms_px : of what is left. share : how far the path would move, over what it
+    is unsure by.
+    """
+
+    kind: str
+    row: int
+    rms_px: float
+    share: float
+
+
 class Report(NamedTuple):
     """rms_px, median_px, mean_px, p95_px, most_px : lengths of reprojection errors in pixels.
 
@@ -54,6 +68,7 @@ class Report(NamedTuple):
     path_sigma : uncertainty of the path over its size; 0 of a camera that only turns.
     point_sigma : (P, 3, 3) covariance of points in world, NaN where there is none.
     kind : "free", "planar" or "nodal". tests : of what was held fixed. warnings, advice : for the artist.
+    fixes : what leaving out the worst tracks and frames would do, the most helpful first.
     """
 
     rms_px: float
@@ -71,6 +86,7 @@ class Report(NamedTuple):
     tests: tuple[Test, ...]
     warnings: tuple[str, ...]
     advice: tuple[str, ...]
+    fixes: tuple[Fix, ...]
 
 
 def report(solution: Solution, names: list[str]) -> Report:
@@ -114,10 +130,12 @@ def report(solution: Solution, names: list[str]) -> Report:
     tests = certain.tests()
     sigma_f = certain.focal_sigma() * float(np.exp(state.lens[FOCAL]))
     warnings = [*solution.said, *_warnings(solution, noisy, out, path, sigma_f, tests)]
+    rms = float(np.sqrt((length**2).mean()))
+    fixes = certain.fixes(rms, by_frame, by_track, path)
     return Report(
-        float(np.sqrt((length**2).mean())), float(np.median(length)), float(length.mean()),
+        rms, float(np.median(length)), float(length.mean()),
         float(np.quantile(length, 0.95)), float(length.max()), by_frame, by_track, focal, sigma_f, path,
-        certain.points, kind, tests, tuple(warnings), _advice(solution, names, by_frame, by_track),
+        certain.points, kind, tests, tuple(warnings), _advice(solution, names, rms, by_frame, by_track, fixes), fixes,
     )
 
 
@@ -151,6 +169,7 @@ class _Certainty:
         place[self._known] = np.arange(len(self._known))
         part = solution.observations.take(solution.used & (number[solution.observations.track] >= 0))
         part = part._replace(frame=place[part.frame], track=number[part.track])
+        self._part = part
         self._state = state._replace(
             rotation=np.ascontiguousarray(state.rotation[self._known]), translation=state.translation[self._known],
             points=state.points[self._held], focal=state.focal[self._known],
@@ -244,12 +263,60 @@ class _Certainty:
             kept[self._rows] = self._root.T @ numbers[: len(self._root)]
             rest = numbers[len(self._root) :].reshape(whole.right_out.shape)
             rest = rest - (whole.across @ kept).reshape(rest.shape)
-            step = np.einsum("mji,mj->mi", whole.roots, rest) * self._solution.sigma
-            # centre = -R^T t, so a shift of t and a turn of R move it by -R^T (shift + t x turn)
-            shift = step[:, 3:6] + np.cross(self._state.translation, step[:, :3])
-            moved = centres - np.einsum("fji,fj->fi", self._state.rotation, shift)
-            errors.append(_after_similarity(moved, centres))
+            errors.append(self._moved_path(whole, rest * self._solution.sigma))
         return float(np.sqrt(np.mean(np.square(errors)))) / max(size, 1e-12)
+
+    def _moved_path(self, whole: Reduced, rest: Array) -> float:
+        """How far the path moves, but for a similarity, by a step whose poses are `rest` (m, 6) through the roots."""
+        step = np.einsum("mji,mj->mi", whole.roots, rest)
+        # centre = -R^T t, so a shift of t and a turn of R move it by -R^T (shift + t x turn)
+        shift = step[:, 3:6] + np.cross(self._state.translation, step[:, :3])
+        centres = self._state.centres()
+        return _after_similarity(centres - np.einsum("fji,fj->fi", self._state.rotation, shift), centres)
+
+    def fixes(self, rms: float, by_frame: Array, by_track: Array, path: float) -> tuple[Fix, ...]:
+        """What the rest would be without each of the worst tracks and frames: one Gauss-Newton step from here.
+
+        (Belsley, Kuh and Welsch, "Regression Diagnostics", 1980, deletion of a group of rows, with the matrix of all.)
+        """
+        if self._root is None or self._whole is None:
+            return ()
+        cost = np.square(residuals(self._state, self._part)).sum(axis=1)
+        tried = [("track", int(row)) for row in _worst(by_track) if row in self._held]
+        tried += [("frame", int(row)) for row in _worst(by_frame)]
+        made = [self._without(kind, row, rms, cost, path) for kind, row in tried]
+        return tuple(sorted((fix for fix in made if fix is not None), key=lambda fix: fix.rms_px))
+
+    def _without(self, kind: str, row: int, rms: float, cost: Array, path: float) -> Fix | None:
+        assert self._root is not None
+        assert self._whole is not None
+        whole, of_track = self._whole, kind == "track"
+        at = int(np.searchsorted(self._held if of_track else self._known, row))
+        gone = (self._part.track if of_track else self._part.frame) == at
+        if not gone.any() or gone.all():
+            return None
+        free = Free(frame=(*self._poses, FRAME_FOCAL), lens=self._lens)
+        normal = normal_equations(self._state, self._part.take(gone), 0.0, free)
+        frames, points = normal.frames_right[:, list(self._poses)], normal.points_right
+        if of_track:
+            points = np.zeros_like(points)  # its own point goes with it
+        else:
+            frames = np.zeros_like(frames)
+        lens = normal.lens_right[list(self._lens)]
+        right = np.concatenate([lens, points.ravel(), normal.frames_right[:, FRAME_FOCAL]])[self._rows]
+        out = np.einsum("mij,mj->mi", whole.roots, frames)
+        kept = self._root @ (right - (whole.across[:, self._rows].T @ out.ravel()))
+        less = cost[gone].sum() + float(kept @ kept) + float((out**2).sum())
+        left = max(0.0, (cost.sum() - less) / cost.sum() * len(cost) / float((~gone).sum()))
+        share = 0.0
+        if not self._nodal and path > 0.0:
+            whole_kept = np.zeros(len(whole.right))
+            whole_kept[self._rows] = self._root.T @ kept
+            rest = out - (whole.across @ whole_kept).reshape(out.shape)
+            centres = self._state.centres()
+            size = float(np.sqrt(((centres - centres.mean(axis=0)) ** 2).sum(axis=1).mean()))
+            share = self._moved_path(whole, rest) / max(size * path, 1e-12)
+        return Fix(kind, row, rms * float(np.sqrt(left)), share)
 
     def tests(self) -> tuple[Test, ...]:
         """Score tests of the parameters of the lens that were held, and of a zoom at an even pace."""
@@ -286,6 +353,12 @@ class _Certainty:
         if name in ("focal length", "pixel aspect", "zoom"):
             better = float(np.exp(min(max(better, -30.0), 30.0)))
         return Test(name, slope**2 / left / self._solution.sigma**2, better)
+
+
+def _worst(error: Array, most: int = 6) -> Rows:
+    """Rows of the greatest errors."""
+    known = np.flatnonzero(np.isfinite(error))
+    return known[np.argsort(-error[known], kind="stable")[:most]].astype(np.int32)
 
 
 def _normal_numbers(rows: int, columns: int) -> Array:
@@ -334,7 +407,9 @@ def _warnings(
     return said
 
 
-def _advice(solution: Solution, names: list[str], by_frame: Array, by_track: Array) -> tuple[str, ...]:
+def _advice(
+    solution: Solution, names: list[str], rms: float, by_frame: Array, by_track: Array, fixes: tuple[Fix, ...]
+) -> tuple[str, ...]:
     """What to mend next, worst first."""
     said = []
     seen = np.bincount(solution.observations.track, minlength=len(names))
@@ -342,16 +417,24 @@ def _advice(solution: Solution, names: list[str], by_frame: Array, by_track: Arr
     if lost:
         more = " ..." if len(lost) > 8 else ""
         said.append(f"Look at the tracks that do not fit: {', '.join(lost[:8])}{more}.")
-    typical = float(np.nanmedian(by_track))
-    for k in np.argsort(-np.nan_to_num(by_track))[:3]:
-        if by_track[k] > 1.5 * typical:
-            said.append(f"Track {names[k]} misses by {by_track[k]:.2f} px; the others by {typical:.2f}.")
+    for fix in helpful(fixes, by_frame, by_track):
+        name = f"track {names[fix.row]}" if fix.kind == "track" else f"frame {solution.frames[fix.row]}"
+        own = (by_track if fix.kind == "track" else by_frame)[fix.row]
+        moves = f" and the path moves by {fix.share:.1f} times its doubt" if fix.share > 1.0 else ""
+        said.append(
+            f"Mend or leave out {name}, which misses by {own:.2f} px: the rest falls from {rms:.3f} to "
+            f"{fix.rms_px:.3f} px{moves}."
+        )
     counts = np.bincount(solution.observations.frame[solution.used], minlength=len(solution.frames))
     thin = np.flatnonzero(counts < 8)
     if len(thin):
         said.append(
             f"Add tracks on frames {solution.frames[thin[0]]} to {solution.frames[thin[-1]]}: some have fewer than 8.")
-    worst = int(np.nanargmax(by_frame)) if np.isfinite(by_frame).any() else 0
-    if by_frame[worst] > 1.5 * float(np.nanmedian(by_frame)):
-        said.append(f"Frame {solution.frames[worst]} misses by {by_frame[worst]:.2f} px; look at its tracks.")
     return tuple(said)
+
+
+def helpful(fixes: tuple[Fix, ...], by_frame: Array, by_track: Array) -> list[Fix]:
+    """At most five of the fixes that are worth a look: what misses by half more than its like, or moves the path."""
+    typical = {"track": float(np.nanmedian(by_track)), "frame": float(np.nanmedian(by_frame))}
+    error = {"track": by_track, "frame": by_frame}
+    return [fix for fix in fixes if error[fix.kind][fix.row] > APART * typical[fix.kind] or fix.share > MOVES][:5]
