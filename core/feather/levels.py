@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.feather.attributes import column
-from core.feather.barbs import BarbCurves, Barbs, condense, expand
+from core.feather.barbs import ANGLE_NOISE, BarbCurves, Barbs, condense, expand
 from core.feather.card import card_of
 from core.feather.coloring import down_mesh, shaft_mesh, vane_mesh
 from core.feather.down import Down, down_hairs
@@ -86,7 +86,8 @@ def _pieces(a: Floats, barbs: Barbs, curves: BarbCurves) -> list[NDArray[np.intp
     stray = barbs.stray.astype(np.float64) / 16384.0
     for side in (0, 1):
         rows = np.flatnonzero(curves.sides == side)
-        breaks = np.flatnonzero(np.abs(np.diff(stray[rows])) > SPLIT) + 1
+        apart = SPLIT + 2.1 * float(a[ANGLE_NOISE + side])
+        breaks = np.flatnonzero(np.abs(np.diff(stray[rows])) > apart) + 1
         for piece in np.split(rows, breaks):
             if len(piece):
                 ends = curves.points[piece][:, (POINTS // 2, POINTS - 1)].reshape(len(piece), 6) / a[LENGTH]
@@ -125,9 +126,9 @@ def _rows(values: NDArray[Any]) -> Floats:
 
 
 def _spread(curves: BarbCurves) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Unit directions towards the next barb (B, P, 3), square to it, and the distance to the nearer one (B, P)."""
+    """Unit directions towards the next barb (B, P, 3), square to it, and distances (B, P, 2) to both."""
     points, along = curves.points.astype(np.float64), tangents(curves.points.astype(np.float64))
-    across, gap = np.zeros_like(points), np.zeros(points.shape[:2])
+    across, gap = np.zeros_like(points), np.zeros((*points.shape[:2], 2))
     for side in (0, 1):
         rows = np.flatnonzero(curves.sides == side)
         if len(rows) < 2:
@@ -140,7 +141,8 @@ def _spread(curves: BarbCurves) -> tuple[NDArray[Any], NDArray[Any]]:
         square = [d - t * np.sum(d * t, axis=-1, keepdims=True) for d in (before, after)]
         sizes = [np.linalg.norm(d, axis=-1) for d in square]
         across[rows] = unit(unit(square[0]) + unit(square[1]) + 1e-9)
-        gap[rows] = np.minimum(np.minimum(*sizes), 3.0 * np.median(sizes[0], axis=0))
+        widest = 2.0 * np.median(sizes[0], axis=0)
+        gap[rows] = np.stack([np.minimum(size, widest) for size in sizes], axis=-1)
     across -= along * np.sum(across * along, axis=-1, keepdims=True)
     return unit(across), gap
 
@@ -155,11 +157,16 @@ def _barb_ribbons(
     closed = a[COVER + sides][:, None] * (1.0 - s) + a[COVER_EDGE + sides][:, None] * s
     base = np.clip(curves.places[..., 0] / 0.25, 0.0, 1.0)
     closed = closed * (a[COVER_BASE + sides][:, None] * (1.0 - base) + base)
-    half = ramus if with_barbules else np.maximum(ramus, 0.56 * closed * gap)
     # near its end a barb runs out to a point
-    half = half * np.sqrt(np.clip((1.0 - np.linspace(0.0, 1.0, POINTS) ** 6), 0.03, 1.0))
-    oriented = across * np.where(sides == 1, 1.0, -1.0)[:, None, None]
-    points, normals, fibres, triangles = ribbons(curves.points, oriented, half, 0.22)
+    pointed = np.sqrt(np.clip((1.0 - np.linspace(0.0, 1.0, POINTS) ** 6), 0.03, 1.0))
+    half = np.repeat(ramus[..., None], 2, axis=-1)
+    if not with_barbules:
+        half = np.maximum(half, 0.56 * closed[..., None] * gap)
+    half = half * pointed[:, None]
+    right = sides == 1
+    half = np.where(right[:, None, None], half, half[..., ::-1])
+    oriented = across * np.where(right, 1.0, -1.0)[:, None, None]
+    points, normals, fibres, triangles = ribbons(curves.points, oriented, half[..., 0], 0.22, half[..., 1])
     each = 2 * POINTS
     tones, numbers = _tones(barbs), np.arange(count, dtype=np.int32)
     flat = _offset_flat(curves, half / a[LENGTH])
@@ -168,7 +175,7 @@ def _barb_ribbons(
         _rows(np.repeat(curves.places, 2, axis=1)), flat, np.repeat(tones, each), np.repeat(numbers, each),
     )]
     if with_barbules:
-        found += _barbules(a, seed, barbs, curves, oriented, gap)
+        found += _barbules(a, seed, barbs, curves, oriented, gap.min(axis=-1))
     return found
 
 
@@ -176,8 +183,8 @@ def _offset_flat(curves: BarbCurves, half: NDArray[Any]) -> Floats:
     """Places in the flat feather of both edges of ribbons, (B * P * 2, 2)."""
     along = np.gradient(curves.flat, axis=1)
     along = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
-    across = np.stack([-along[..., 1], along[..., 0]], axis=-1) * half[..., None]
-    return _rows(np.stack([curves.flat - across, curves.flat + across], axis=2))
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)[:, :, None] * half[..., None]
+    return _rows(curves.flat[:, :, None] + across * np.array([-1.0, 1.0])[:, None])
 
 
 def _barbules(
@@ -239,9 +246,16 @@ def _down(a: Floats, seed: int, level: Level) -> list[FeatherMesh]:
         half = half + 0.5 * a[LENGTH] * a[FRINGE_LENGTH + sides][:, None] * (1.0 - 0.5 * s)
         thin = 0.35
     points, normals, fibres, triangles = ribbons(hairs.points, across, half, 0.5)
-    flat = _rows(np.repeat(hairs.flat, 2, axis=1))
+    flat = _flat_beside(a, points, hairs.points, hairs.flat)
     found = [down_mesh(a, points, normals, fibres, triangles, flat, np.repeat(tones, 2 * HAIR_POINTS), thin)]
     return found if level == "vane" else found + _fringe(a, seed, hairs, across, tones)
+
+
+def _flat_beside(a: Floats, points: Floats, curves: NDArray[Any], flat: NDArray[Any]) -> Floats:
+    """Places in the flat feather (V, 2) of points (V, 3) close to `curves` (..., 3), whose own are `flat` (..., 2)."""
+    count = len(points) // max(curves.size // 3, 1)
+    off = points - np.repeat(_rows(curves), count, axis=0)
+    return np.asarray(np.repeat(_rows(flat), count, axis=0) + off[:, :2] / a[LENGTH], np.float32)
 
 
 def _beside(hairs: Down, seed: int) -> NDArray[Any]:
@@ -281,7 +295,7 @@ def _fringe(
         square = unit(np.cross(np.repeat(up.reshape(-1, 1, 3), 2, axis=1), tangents(blades)))
         points, normals, fibres, triangles = ribbons(np.asarray(blades, np.float32), square, half, 0.3)
         found.append(down_mesh(
-            a, points, normals, fibres, triangles, np.repeat(_rows(flat), 4, axis=0),
+            a, points, normals, fibres, triangles, _flat_beside(a, points, root, flat),
             np.repeat(tones[rows], 8 * number), 0.8,
         ))
     return found

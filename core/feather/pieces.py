@@ -60,7 +60,7 @@ def joined(parts: list[FeatherMesh]) -> FeatherMesh:
 def strips(count: int, points: int) -> NDArray[np.int32]:
     """Triangles of `count` strips whose vertices are numbered (strip, point, left or right)."""
     first = 2 * np.arange(points - 1)[None, :, None] + 2 * points * np.arange(count)[:, None, None]
-    quads = np.concatenate([first + np.array([0, 1, 3]), first + np.array([0, 3, 2])], axis=-1)
+    quads = np.concatenate([first + np.array([0, 3, 1]), first + np.array([0, 2, 3])], axis=-1)
     return np.asarray(quads.reshape(-1, 3), np.int32)
 
 
@@ -77,16 +77,18 @@ def tangents(curves: NDArray[Any]) -> NDArray[Any]:
 
 
 def ribbons(
-    curves: Floats, across: NDArray[Any], half: NDArray[Any], round_by: float
+    curves: Floats, across: NDArray[Any], half: NDArray[Any], round_by: float, other_half: NDArray[Any] | None = None
 ) -> tuple[Floats, Floats, Floats, NDArray[np.int32]]:
     """Flat ribbons along curves (B, P, 3): points, normals and fibres (B * P * 2, 3), and triangles.
 
-    across : (B, P, 3) unit, square to the curves. half : (B, P) half the width, metres.
+    across : (B, P, 3) unit, square to the curves. half : (B, P) half the width, metres; `other_half` that towards
+        `across` where it differs.
     round_by : how far normals lean outwards at the edges, so that a ribbon takes the light as a round fibre would.
     """
     along = tangents(curves)
     normal = unit(np.cross(along, across))
-    points = np.stack([curves - across * half[..., None], curves + across * half[..., None]], axis=2)
+    other = half if other_half is None else other_half
+    points = np.stack([curves - across * half[..., None], curves + across * other[..., None]], axis=2)
     normals = unit(np.stack([normal - round_by * across, normal + round_by * across], axis=2))
     fibres = np.repeat(along[:, :, None], 2, axis=2)
     count, length = curves.shape[:2]
