@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.mesh.scatter_kernels import (
+from core.mesh.dart_kernels import (
+    AT_ONCE,
     BLOCK,
     FIRST_RADIUS,
     LOG_SHRINK,
@@ -17,15 +19,18 @@ from core.mesh.scatter_kernels import (
     OCTAVES,
     SHRINK,
     arriving,
+    awake,
     fill_buckets,
     find_buckets,
-    test_candidates,
+    find_rivals,
+    put_to_sleep,
+    settle,
     waking,
 )
 from core.workers import Workers, serial_ranges
 
 CELL = 4.0  # size of a cell over the radius; at least 2
-CELL_OF_NEW = 8.0  # the same for the few roots of one level
+CELL_OF_NEW = 4.0  # the same for the few candidates of one level that are left
 BUCKETS_PER_ROOT = 1
 GRAIN = 4096  # candidates worth a thread
 
@@ -58,8 +63,9 @@ def even_subset(
 ) -> Subset:
     """Choose at least `count` candidates; the last level is finished. `size` is the square root of the area.
 
-    At every level those who wake, then batches of newcomers, are tested against the roots there are, on all threads;
-    those who pass are tested against each other, one after the other. So the result does not depend on threads.
+    At every level those who wake, then batches of newcomers, are tested against the roots there are; those who pass are
+    tested against each other. That is done on all threads; then those who pass become roots one after the other,
+    unless one before them is too near. So the result does not depend on threads.
     """
     darts = _Darts(candidates, size, workers)
     ends = candidates.ends
@@ -89,6 +95,60 @@ def _last_level(level: int, accepted: int, count: int) -> int:
     return level + max(0, math.ceil(math.log(missing) / (-2.0 * LOG_SHRINK)) - 1)
 
 
+class _Cells(NamedTuple):
+    """The points of a grid as kernels take them.
+
+    points : (room, 4) float32, place and stretch in the order they came.
+    x, y, z, stretch, sides, rows : the same bucket after bucket, with face and row; those of bucket b lie from
+        ``firsts[b]`` to ``firsts[b + 1]``.
+    counts : how many there are of each octave of the stretch. cell : size. mask : of the hash.
+    """
+
+    points: NDArray[np.float32]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    z: NDArray[np.float32]
+    stretch: NDArray[np.float32]
+    sides: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    firsts: NDArray[np.int32]
+    counts: NDArray[np.int64]
+    cell: float
+    mask: int
+
+
+class _Grid:
+    """Points that are sorted into cells anew at every level.
+
+    points, faces, counts : (room, 4) and (room,), to be written; see :class:`_Cells`.
+    """
+
+    def __init__(self, room: int, ranges: Callable[..., None]) -> None:
+        self._ranges = ranges
+        # room for all candidates costs no memory where nothing is written
+        self.points, self.faces = np.empty((room, 4), np.float32), np.empty(room, np.int32)
+        self.counts = np.zeros(OCTAVES, np.int64)
+        x, y, z, stretch = (np.empty(room + AT_ONCE, np.float32) for _ in range(4))
+        self._sorted = x, y, z, stretch, np.empty(room, np.int32), np.empty(room, np.int32)
+        self._buckets = np.empty(room, np.int32)
+        self._mask, self._firsts = 0, np.zeros(BLOCK + 1, np.int32)
+
+    def cells(self, n: int, cell: float) -> _Cells:
+        """The first `n` points, sorted into cells of this size."""
+        while BUCKETS_PER_ROOT * n > BLOCK * (self._mask + 1):
+            self._mask = 2 * self._mask + 1
+        count = BLOCK * (self._mask + 1)
+        if len(self._firsts) <= count:
+            self._firsts = np.zeros(count + 1, np.int32)
+        self._ranges(n, lambda a, b: find_buckets(self.points, a, b, cell, self._mask, self._buckets), GRAIN)
+        self._ranges(
+            count,
+            lambda a, b: fill_buckets(self.points, self.faces, self._buckets, n, a, b, self._firsts, *self._sorted),
+            GRAIN,
+        )
+        return _Cells(self.points, *self._sorted, self._firsts, self.counts, cell, self._mask)
+
+
 class _Darts:
     """Roots in a grid of cells, and the candidates that sleep.
 
@@ -102,58 +162,38 @@ class _Darts:
         self._ranges = serial_ranges if workers is None else workers.ranges
         total = len(candidates.triangle)
         self.accepted = 0
-        # room for all candidates costs no memory where nothing is written
         self.chosen, self.levels = np.empty(total, np.int64), np.empty(total, np.int64)
-        # of each root its place and stretch, in order of acceptance; the grid has them in order of buckets
-        self._roots, self._faces = np.empty((total, 4), np.float32), np.empty(total, np.int32)
-        self._grid, self._grid_faces = np.empty_like(self._roots), np.empty_like(self._faces)
-        self._buckets, self._links = np.empty_like(self._faces), np.empty_like(self._faces)
+        self._roots, self._left = _Grid(total, self._ranges), _Grid(total, self._ranges)
+        self._rival, self._gap = np.empty(total, np.int32), np.empty(total, np.float32)
         self.wake = np.full(total, NEVER, np.uint16)
         self.active = np.empty(total + 1, np.int32)
-        self._counts, self._new_counts = np.zeros(OCTAVES, np.int64), np.zeros(OCTAVES, np.int64)
-        self._mask = 0
-        self._firsts, self._new_firsts = np.zeros(BLOCK + 1, np.int32), np.full(BLOCK, -1, np.int32)
 
     def throw(self, woken: int, count: int, level: int, last: int) -> None:
         """Make roots of the first `count` of the active candidates where they fit; the rest sleeps, most of them for
         good when they lie too near for the level `last`. The first `woken` have slept before."""
         radius = FIRST_RADIUS * self._size * SHRINK**level
-        cell = CELL * radius
-        self._build_grid(cell)
-        known = self._candidates[:4]
         last_radius = FIRST_RADIUS * self._size * SHRINK**last
-        at = radius, last_radius, self._size, level, self.wake, self.chosen, self.levels, self.accepted
+        triangle, places, stretch, normals = self._candidates[:4]
+        roots, left = self._roots, self._left
+        known = roots.cells(self.accepted, CELL * radius)
 
         def test(start: int, stop: int) -> None:
             # the same share of both, for those who slept fit more often, which takes a longer search to say
             for begin, size in ((0, woken), (woken, count - woken)):
-                test_candidates(
-                    False, self.active, begin + size * start // count, begin + size * stop // count, *known,
-                    self._grid, self._grid_faces, self._firsts, self._links, self._counts, cell, self._mask, *at,
+                put_to_sleep(
+                    self.active, begin + size * start // count, begin + size * stop // count, triangle, places, stretch,
+                    normals, *known, radius, last_radius, self._size, level, self.wake,
                 )
 
         self._ranges(count, test, GRAIN)
-        self._new_counts[:] = 0
-        self.accepted = test_candidates(
-            True, self.active, 0, count, *known, self._roots, self._faces, self._new_firsts, self._links,
-            self._new_counts, CELL_OF_NEW * radius, self._mask >> 2, *at,
+        total = awake(
+            self.active, count, triangle, places, stretch, self.wake, level, left.points, left.faces, left.counts
         )
-        self._counts += self._new_counts
-
-    def _build_grid(self, cell: float) -> None:
-        n = self.accepted
-        while BUCKETS_PER_ROOT * n > BLOCK * (self._mask + 1):
-            self._mask = 2 * self._mask + 1
-        count = BLOCK * (self._mask + 1)
-        if len(self._new_firsts) < count:
-            self._firsts, self._new_firsts = np.zeros(count + 1, np.int32), np.full(count, -1, np.int32)
+        new = left.cells(total, CELL_OF_NEW * radius)
         self._ranges(
-            n, lambda a, b: find_buckets(self._roots, a, b, cell, self._mask, self._buckets), GRAIN
+            total, lambda a, b: find_rivals(a, b, left.faces, normals, *new, radius, self._rival, self._gap), GRAIN // 4
         )
-        self._ranges(
-            count,
-            lambda a, b: fill_buckets(
-                self._roots, self._faces, self._buckets, n, a, b, self._firsts, self._grid, self._grid_faces
-            ),
-            GRAIN,
+        self.accepted = settle(
+            self.active, total, left.faces, normals, *new, radius, self._size, level, self._rival, self._gap, self.wake,
+            roots.points, roots.faces, roots.counts, self.chosen, self.levels, self.accepted,
         )
