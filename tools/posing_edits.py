@@ -11,7 +11,7 @@ from core.document import Document, with_mesh
 from core.errors import UserError
 from core.pose.clip import check_frames
 from core.pose.controls import rests, without_noise
-from core.pose.keying import keyed, still_clip
+from core.pose.keying import keyed, still_clip, with_moved_key, without_key
 from core.pose.mirror_pose import mirror_of_rig, mirrored_pose, with_other_side
 from core.pose.pose import REST, Pose
 from core.pose.pose_map import mixed_pose
@@ -79,6 +79,45 @@ def key_pose(document: Document, mesh_id: int, pose: Pose, frame: float) -> Docu
         clip = still_clip(rig.skeleton, float(document.first_frame), count, document.fps, name)
     clip = keyed(clip, rig, pose, frame)
     return with_mesh(document, item.replace(rig=rig.replace(clip=clip), pose=None))
+
+
+def delete_pose_keys(document: Document, mesh_id: int, frames: Sequence[float]) -> Document:
+    """The document without the keys of poses on some frames of the clip (see ``core.pose.keying.without_key``).
+
+    Raises
+    ------
+    UserError
+        None of the frames has a key.
+    """
+    item, rig = rigged(document, mesh_id)
+    clip = rig.clip
+    for frame in frames if clip is not None else ():
+        assert clip is not None
+        clip = without_key(clip, frame)
+    if clip is None or clip is rig.clip:
+        raise UserError("No pose is keyed on this frame; go to a key of the timeline.")
+    return with_mesh(document, item.replace(rig=rig.replace(clip=clip)))
+
+
+def move_pose_keys(document: Document, mesh_id: int, frames: Sequence[float], by: float) -> Document:
+    """The document with keys of poses on some frames of the clip moved by whole frames.
+
+    Raises
+    ------
+    UserError
+        A key that is not moved is in the way.
+    """
+    item, rig = rigged(document, mesh_id)
+    clip, step = rig.clip, round(by)
+    if clip is None or not step:
+        return document
+    mine = {round(frame) for frame in frames}
+    others = {round(clip.start + key) for key in clip.keys} - mine
+    if any(frame + step in others for frame in mine):
+        raise UserError("Another key is in the way; delete it first, or move the key elsewhere.")
+    for frame in sorted(mine, reverse=step > 0):
+        clip = with_moved_key(clip, rig, frame, frame + step)
+    return with_mesh(document, item.replace(rig=rig.replace(clip=clip)))
 
 
 def held_in_library(document: Document, mesh_id: int, pose: Pose) -> str | None:

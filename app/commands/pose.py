@@ -110,7 +110,7 @@ def _read(path: Path, unit: str | None, up: str | None, report: Report) -> tuple
 
 
 def _built(path: Path, item: MeshObject, report: Report) -> tuple[Rig, Extracted]:
-    file = read_poses(path, item.rig)  # type: ignore[arg-type]
+    file = read_poses(path, item.rig, item.mesh)  # type: ignore[arg-type]
     for note in file.notes:
         report.note(note)
     try:

@@ -29,7 +29,9 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.formats.mesh_file import READ_SUFFIXES, read_mesh
+from core.formats.sculpt_topology import check_topology
 from core.formats.text_numbers import text_bytes
+from core.mesh.mesh import Mesh
 from core.pose.controls import rests, rotation_dof, translation_dof
 from core.pose.layers import Sculpt
 from core.pose.pose import Pose, moved_controls
@@ -114,8 +116,12 @@ class Moment(NamedTuple):
     frame: float | None
 
 
-def read_poses(path: Path, rig: Rig) -> PoseFile:
+def read_poses(path: Path, rig: Rig, mesh: Mesh | None = None) -> PoseFile:
     """Read POSES.json and the sculpts it names, which lie beside it.
+
+    Parameters
+    ----------
+    mesh : of the rig; a note says which sculpt joins other vertices to faces than it does. None does not look.
 
     Raises
     ------
@@ -155,6 +161,11 @@ def read_poses(path: Path, rig: Rig) -> PoseFile:
                     f"{where}: the falloff of {control!r} must be one number, or {FALLOFFS[kind]} for {kind}.")
             falloffs[control] = tuple(math.radians(one) for one in each) if turning else each
         target = None if item.sculpt is None else read_sculpt(path.parent / item.sculpt, rig, where, notes.append)
+        if item.sculpt is not None and mesh is not None:
+            try:
+                check_topology(path.parent / item.sculpt, mesh, rig)
+            except UserError as error:  # its points are taken in their order all the same; somebody should look
+                notes.append(f"{where}: {error}")
         sculpts.append(Sculpt(pose, target, falloffs))
     fields = [name for name in _Poses.__struct_fields__ if name not in FURTHER]
     if not 0.0 <= said.smoothing <= 1e3 or not 0 <= said.weighted <= 64 or said.table not in (0, *range(2, 65537)):

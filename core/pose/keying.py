@@ -9,6 +9,7 @@ from core.pose.clip import MOST_FRAMES, check_frames, split_matrices, without_fl
 from core.pose.pose import Pose, local_of_pose
 from core.pose.rig import Rig
 from core.pose.skeleton import Clip, Skeleton
+from core.pose.synthesis import pose_at
 from core.record import freeze
 from core.transform import slerp
 
@@ -65,6 +66,80 @@ def keyed(clip: Clip, rig: Rig, pose: Pose, frame: float) -> Clip:
         translations=freeze(moved.astype(np.float32)), rotations=freeze(without_flips(turned).astype(np.float32)),
         number_names=names, numbers=None if numbers is None else freeze(numbers.astype(np.float32)),
         keys=tuple(sorted({*clip.keys, at})))
+
+
+def without_key(clip: Clip, frame: float) -> Clip:
+    """The clip without the key at the sample nearest to a frame; the clip itself where there is none.
+
+    Between two keys alone the motion goes straight from one to the other again, and beyond the last it is held, as if
+    the key had never been. Captured motion, which does not ease from key to key, stays as it is: only the mark goes.
+    """
+    at = round(min(max(frame - clip.start, -1.0), 2.0 * MOST_FRAMES))
+    if at not in clip.keys:
+        return clip
+    before = max((k for k in clip.keys if k < at), default=None)
+    after = min((k for k in clip.keys if k > at), default=None)
+    left: Clip = clip.replace(keys=tuple(k for k in clip.keys if k != at))
+    if not (_eases(clip, before, at) and _eases(clip, at, after)) or (before is None and after is None):
+        return left
+    first, last = before if before is not None else 0, after if after is not None else len(clip.translations) - 1
+    a, b = (before if before is not None else after), (after if after is not None else before)
+    assert a is not None
+    assert b is not None
+    rows = _between(clip, a, b, first, last)
+    whole: dict[str, NDArray[np.float32]] = {}
+    for name, part in rows.items():
+        values = getattr(clip, name).copy()
+        values[first : last + 1] = part
+        whole[name] = freeze(values)
+    mended: Clip = left.replace(**whole)
+    return mended
+
+
+def with_moved_key(clip: Clip, rig: Rig, frame: float, to: float) -> Clip:
+    """The clip with the key of one frame at another, where it has the pose it had."""
+    if round(frame - clip.start) not in clip.keys or round(frame) == round(to):
+        return clip
+    pose = pose_at(rig.replace(clip=clip), frame)
+    return keyed(without_key(clip, frame), rig, pose, to)
+
+
+SAME = 1e-4  # metres, or of a quaternion: what samples in single precision miss an eased way by
+
+
+def _eases(clip: Clip, a: int | None, b: int | None) -> bool:
+    """True when the samples from key to key, or from a key to the end of the clip, are only what joins them."""
+    first = 0 if a is None else a
+    last = len(clip.translations) - 1 if b is None else b
+    one, other = (b if a is None else a), (a if b is None else b)
+    assert one is not None
+    assert other is not None
+    made = _between(clip, one, other, first, last)
+    for name, part in made.items():
+        there = getattr(clip, name)[first : last + 1].astype(np.float64)
+        if name == "rotations":  # q and -q turn the same
+            part = part * np.where((part * there).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+        if np.abs(part - there).max(initial=0.0) > SAME:
+            return False
+    return True
+
+
+def _between(clip: Clip, a: int, b: int, first: int, last: int) -> dict[str, NDArray[np.float32]]:
+    """Rows first .. last of the arrays of a clip that eases from its sample `a` to `b`; all alike when they are one."""
+    count = last - first + 1
+    t = np.zeros(count) if a == b else (np.arange(first, last + 1) - a) / (b - a)
+    share = t * t * (3.0 - 2.0 * t)
+
+    def mixed(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        part = share.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray((1.0 - part) * values[a] + part * values[b], np.float32)
+
+    joints = clip.rotations.shape[1]
+    turned = slerp(np.repeat(clip.rotations[a : a + 1], count, axis=0), np.repeat(clip.rotations[b : b + 1], count, 0),
+                   np.repeat(share[:, None], joints, axis=1)) if joints else clip.rotations[first : last + 1]
+    made = {"translations": mixed(clip.translations), "scales": mixed(clip.scales),
+            "rotations": without_flips(np.asarray(turned, np.float64)).astype(np.float32)}
+    return made if clip.numbers is None else {**made, "numbers": mixed(clip.numbers)}
 
 
 def _reaching(clip: Clip, at: int) -> Clip:

@@ -83,6 +83,19 @@ def test_every_sculpt_comes_back_in_the_order_of_the_rig_file(folder):
         filoplume("info", folder / "arm.glb", "--json").stdout)["controls"])
 
 
+def test_a_sculpt_with_other_faces_is_told(folder):
+    """As many vertices, but joined otherwise: as another program's order of vertices shows itself."""
+    text = (folder / "bent.obj").read_text()
+    faces = read_rig(folder / "arm.glb")
+    count = len(faces.rig.file_vertices)
+    (folder / "mixed.obj").write_text(text + f"f 1 {count // 2} {count}\n")
+    done = build(folder, [{**POSES[0], "sculpt": "mixed.obj"}], "-o", folder / "mixed.filo")
+    assert done.returncode == 0
+    assert "which no face of the rig does" in done.stderr
+    done = build(folder, POSES[:1], "-o", folder / "alike.filo")
+    assert "no face of the rig" not in done.stderr
+
+
 def test_a_sculpt_that_opens_seams_leaves_them_closed_and_is_told(folder):
     """Every vertex of the file is pushed by itself, as no program with seams of UVs would show it."""
     found = read_rig(folder / "arm.glb")

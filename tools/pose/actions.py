@@ -224,6 +224,9 @@ _TABLE: tuple[PoseAction, ...] = (
         "key_pose", "Key pose", "Keys the pose that is shown in the clip at this frame, eased to the keys beside it.",
         "Key pose", posing_edits.key_pose, lambda s, p: (s.pose, s.frame), icon="key-set"),
     PoseAction(
+        "delete_pose_key", "Delete pose key", "Takes the key of the pose on this frame out of the clip.",
+        "Delete pose key", posing_edits.delete_pose_keys, lambda s, p: ((s.frame,),), icon="delete"),
+    PoseAction(
         "store_pose", "Store pose", "Keeps the pose that is shown in the library, to come back to later.",
         "Store pose", pose_edits.keep_pose, _stored, told.NameParams, "bookmark"),
     PoseAction(

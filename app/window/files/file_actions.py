@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMenu
 
 from app.window.files.opening import MESH_SUFFIXES, PICTURE_SUFFIXES, choose_file, filter_of
 from app.window.files.recent import RecentMenu
+from app.window.pose.sculpt_door import import_sculpt
 from app.window.screenshot import view_image
 from core.document import Document, find_mesh
 from core.errors import UserError
@@ -82,7 +83,7 @@ class FileActions:
         if path is None:
             self._choose("Import a sculpt", [filter_of("Meshes", MESH_SUFFIXES)], self.import_sculpt)
             return
-        self._desk.session.act("import_sculpt", file=str(path))
+        import_sculpt(self._desk, path)
 
     def reload_mesh(self, path: Path | None = None, mesh_id: int | None = None) -> None:
         """Put another shape in place of a mesh, the active one unless it is named; its hair comes along."""

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QVBox
 
 from app.window.desk import Desk
 from app.window.icons import IconButton
+from app.window.pose.key_row import PoseKeyRow
 from app.window.theme import Look, look_of, text_font
 from app.window.timeline.dope_row import DopeRow
 from app.window.timeline.playback import Playback
@@ -222,6 +223,7 @@ class Timeline(QWidget):
         self.playback = Playback(desk, self)
         self.ruler = Ruler(desk)
         self.keys = DopeRow(desk.keys, self.ruler.scale)
+        self.pose_keys = PoseKeyRow(desk, self.ruler.scale)
         self.play = IconButton("play", "Plays the frames in a loop at the rate of the project, or stops.")
         self.frame = NumberField("The current frame; type another to go there.", self._type_frame)
         self.first = NumberField("The first frame of the timeline; type another to change the range.",
@@ -248,6 +250,7 @@ class Timeline(QWidget):
         times.setSpacing(0)
         times.addWidget(self.ruler)
         times.addWidget(self.keys)
+        times.addWidget(self.pose_keys)
         line.addLayout(times, 1)
         for widget in (self.first, self._dash, self.last):
             line.addWidget(widget)

@@ -114,7 +114,8 @@ def test_a_name_is_asked_for(name: str, rigged: Host) -> None:
 
 
 def test_a_sculpt_is_asked_for_and_imported(opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    window: MainWindow = opened(ready()).window
+    hand = opened(ready())
+    window: MainWindow = hand.window
     wanted = strip().points + np.float32([0, 0, 0.05])
     write_mesh(tmp_path / "up.obj", strip().replace(points=freeze(wanted)))
 
@@ -124,4 +125,4 @@ def test_a_sculpt_is_asked_for_and_imported(opened: Opened, tmp_path: Path, monk
 
     monkeypatch.setattr(file_actions, "choose_file", choose)
     assert window.commands.run("pose.import_sculpt")
-    assert window.desk.session.history.undo_name == "Import sculpt"
+    hand.until(lambda: window.desk.session.history.undo_name == "Import sculpt")

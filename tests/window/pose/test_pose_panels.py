@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ from core.document import Document, find_mesh, with_mesh
 from core.overlay import Circle
 from core.pose.compare import LABELS
 from core.pose.edit_layers import cross_talk
-from core.pose.pose import REST
+from core.pose.pose import REST, Pose
+from core.pose.rig import playing
 from core.pose.rotation import euler_from_quaternion, quaternion_from_euler
 from core.pose.synthesis import evaluate
 from core.posed import shown_points
@@ -474,3 +476,52 @@ def test_a_stroke_that_is_refused_can_still_be_merged(posing: Hand) -> None:
     after = evaluate(item.mesh.points, item.rig, item.correctives, bent)
     assert np.abs(after - points).max() > 1e-3
     assert len(item.correctives.layers[0].space.samples) == 1
+
+
+def test_keys_of_poses_stand_on_the_timeline_and_are_moved_and_deleted(posing: Hand) -> None:
+    desk, row = posing.window.desk, posing.window.timeline.pose_keys
+    assert not row.isVisible()
+    desk.set_workspace(mesh=2)
+    desk.edit("No clip", lambda document: with_mesh(document, document.meshes[1].replace(
+        rig=playing(document.meshes[1].rig, None))))
+    pad = part(posing, PoseControls).pad
+    for frame, x in ((1001.0, 0.0), (1021.0, 0.8)):
+        desk.set_workspace(frame=frame)
+        QTest.mouseClick(pad, LEFT, pos=pad.to_pixel(x, 0.3).toPoint())
+        posing.window.commands.run("pose.key_pose")
+    posing.until(row.isVisible)
+    assert row.frames == (1001.0, 1021.0)
+    scale, middle = posing.window.timeline.ruler.scale, row.height() // 2
+    here, there = (QPoint(round(scale.x_of(frame)), middle) for frame in (1021.0, 1031.0))
+    QTest.mousePress(row, LEFT, pos=here)
+    QTest.mouseMove(row, (here + there) / 2)
+    QTest.mouseMove(row, there)
+    QTest.mouseRelease(row, LEFT, pos=there)
+    assert row.frames[-1] == 1031.0
+    clip = desk.posed.rig.clip
+    at = clip.number_names.index("valence")
+    assert clip.numbers[30, at] == pytest.approx(0.8, abs=0.02)
+    assert 0.1 < clip.numbers[15, at] < 0.7, "it eases there over the longer way"
+    QTest.keyClick(row, Qt.Key.Key_Delete)
+    assert row.frames[-1] == 1001.0
+    assert np.abs(desk.posed.rig.clip.numbers[:, at]).max() < 0.02, "as if it had never been keyed"
+    assert list(desk.session.history.names)[-2:] == ["Move pose keys", "Delete pose keys"]
+
+
+def test_a_sculpt_is_read_while_the_window_goes_on(posing: Hand, tmp_path: Path) -> None:
+    desk, item = posing.window.desk, posing.window.desk.posed
+    turned = {"wrist": tuple(map(float, quaternion_from_euler((30.0, 0.0, 0.0))))}
+    desk.edit("Pose", hold_pose, 1, Pose(name="new", rotations=turned))
+    there = item.mesh.points if item.rig.file_vertices is None else item.mesh.points[item.rig.file_vertices]
+    (tmp_path / "new.obj").write_text("".join(f"v {x:.9g} {y + 0.01:.9g} {z:.9g}\n" for x, y, z in there))
+    before = desk.document
+    posing.window.import_sculpt(tmp_path / "new.obj")
+    assert desk.document is before, "it is not there yet"
+    posing.until(lambda: desk.session.history.undo_name == "Import sculpt")
+    assert "new" in [s.name for layer in desk.posed.correctives.layers for s in layer.space.samples]
+    (tmp_path / "few.obj").write_text("v 0 0 0\n")
+    said: list[str] = []
+    desk.failed.connect(lambda words, details: said.append(words))
+    posing.window.import_sculpt(tmp_path / "few.obj")
+    posing.until(lambda: bool(said))
+    assert "few.obj" in said[0]
