@@ -76,7 +76,7 @@ class Rebound(NamedTuple):
     weights: NDArray[np.float32]
 
 
-@njit(types.int64(NET, I1, types.int64), cache=True, nogil=True)
+@njit(types.int64(NET, I1, types.int64), cache=True, nogil=True, error_model="numpy")
 def _insert_sites(net, vertices, base):  # type: ignore[no-untyped-def]
     """Make vertices of the tracked points ``base + v``; returns how many found a place."""
     done = 0

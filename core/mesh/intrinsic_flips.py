@@ -58,14 +58,14 @@ FREE, TOUCHED, WAITING, FLIPS = 0, 1, 2, 3
 CLAMP = 2e-5  # a new vertex keeps this share of its triangle from every edge
 
 
-@njit(types.float64(types.float64, types.float64, types.float64), cache=True, nogil=True)
+@njit(types.float64(types.float64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy")
 def area(a, b, c):  # type: ignore[no-untyped-def]
     """Area of a triangle from its edge lengths (Heron), zero when they do not close."""
     s = (a + b + c) * (b + c - a) * (c + a - b) * (a + b - c)
     return 0.25 * sqrt(s) if s > 0.0 else 0.0
 
 
-@njit(types.void(NET, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64), cache=True, nogil=True, error_model="numpy")
 def touch(net, f):  # type: ignore[no-untyped-def]
     """Note that the points of face `f` moved."""
     if net.changed[f] == 0:
@@ -74,7 +74,7 @@ def touch(net, f):  # type: ignore[no-untyped-def]
         net.tally[TOUCHED] += 1
 
 
-@njit(types.void(NET, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64), cache=True, nogil=True, error_model="numpy")
 def enqueue(net, h):  # type: ignore[no-untyped-def]
     """Put half-edge `h` on the list of edges to be tested."""
     if net.queued[h] == 0:
@@ -83,7 +83,7 @@ def enqueue(net, h):  # type: ignore[no-untyped-def]
         net.tally[WAITING] += 1
 
 
-@njit(types.void(NET, types.int64, types.int64, types.float64, types.float64, types.float64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64, types.int64, types.float64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy")
 def put_point(net, p, f, b0, b1, b2):  # type: ignore[no-untyped-def]
     """Hang point `p` into face `f`, weights clamped to the triangle."""
     b0 = max(b0, 0.0)
@@ -103,7 +103,7 @@ def put_point(net, p, f, b0, b1, b2):  # type: ignore[no-untyped-def]
     net.head[f] = p
 
 
-@njit(types.float64(NET, types.int64), cache=True, nogil=True)
+@njit(types.float64(NET, types.int64), cache=True, nogil=True, error_model="numpy")
 def cotangent(net, h):  # type: ignore[no-untyped-def]
     """Cotangent of the angle opposite half-edge `h` in its face."""
     f, k = h // 3, h % 3
@@ -113,7 +113,7 @@ def cotangent(net, h):  # type: ignore[no-untyped-def]
     return (a * a + b * b - c * c) / max(4.0 * area(a, b, c), 1e-14 * c * c)
 
 
-@njit(types.boolean(NET, types.int64), cache=True, nogil=True)
+@njit(types.boolean(NET, types.int64), cache=True, nogil=True, error_model="numpy")
 def flip(net, h):  # type: ignore[no-untyped-def]
     """Exchange the diagonal of the two triangles at `h`; False where they do not form a convex quad."""
     t = net.twin[h]
@@ -212,7 +212,7 @@ def flip(net, h):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(types.void(NET, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64), cache=True, nogil=True, error_model="numpy")
 def legalise(net, cap):  # type: ignore[no-untyped-def]
     """Flip waiting edges until the triangulation is Delaunay there (at most `cap` flips, then give up)."""
     while net.tally[WAITING] > 0:
@@ -232,7 +232,7 @@ def legalise(net, cap):  # type: ignore[no-untyped-def]
                     enqueue(net, g + k)
 
 
-@njit(types.void(NET), cache=True, nogil=True)
+@njit(types.void(NET), cache=True, nogil=True, error_model="numpy")
 def legalise_all(net):  # type: ignore[no-untyped-def]
     """Make the whole triangulation Delaunay."""
     edges = len(net.origin)
@@ -242,7 +242,7 @@ def legalise_all(net):  # type: ignore[no-untyped-def]
     legalise(net, 20 * edges)
 
 
-@njit(types.void(NET, types.int64, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64, types.int64), cache=True, nogil=True, error_model="numpy")
 def _move_edge(net, old, new):  # type: ignore[no-untyped-def]
     """Half-edge `old` goes to slot `new`, with its length and its twin."""
     other = net.twin[old]
@@ -253,7 +253,7 @@ def _move_edge(net, old, new):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.boolean(NET, types.int64, types.int64, types.float64, types.float64, types.float64), cache=True, nogil=True
+    types.boolean(NET, types.int64, types.int64, types.float64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy"
 )
 def insert_vertex(net, v, f, w0, w1, w2):  # type: ignore[no-untyped-def]
     """Put vertex `v` into face `f` at weights w, then restore Delaunay; False when no face is left for it."""
@@ -309,7 +309,7 @@ def insert_vertex(net, v, f, w0, w1, w2):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(types.void(NET, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64), cache=True, nogil=True, error_model="numpy")
 def unhang(net, p):  # type: ignore[no-untyped-def]
     """Take point `p` out of its face's list (its weights stay)."""
     f = net.home[p]

@@ -16,7 +16,7 @@ _RB1 = types.Array(types.uint8, 1, "C", readonly=True)
 SITE, PHANTOM, HELPER = 1, 2, 3  # what a vertex that stays is
 
 
-@njit(types.void(NET, I1, F2, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, I1, F2, types.int64), cache=True, nogil=True, error_model="numpy")
 def hang_points(net, face, bary, start):  # type: ignore[no-untyped-def]
     """Hang points ``start ..`` into their faces (-1: none)."""
     for i in range(len(face) - 1, -1, -1):  # backwards, so that lists run forwards
@@ -51,7 +51,7 @@ def gather_points(given, triangle, bary, face, flipped, start, stop, home, out):
             out[p, 1], out[p, 2] = out[p, 2], out[p, 1]
 
 
-@njit(types.void(NET, types.int64, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, types.int64, types.int64), cache=True, nogil=True, error_model="numpy")
 def hang_again(net, start, stop):  # type: ignore[no-untyped-def]
     """Hang points start .. stop into their homes, where they have one."""
     for p in range(stop - 1, start - 1, -1):  # backwards, so that lists run forwards
@@ -61,7 +61,7 @@ def hang_again(net, start, stop):  # type: ignore[no-untyped-def]
             net.head[f] = p
 
 
-@njit(types.boolean(NET, B1, I1, F1), cache=True, nogil=True)
+@njit(types.boolean(NET, B1, I1, F1), cache=True, nogil=True, error_model="numpy")
 def label_helpers(net, kind, label, distance):  # type: ignore[no-untyped-def]
     """Give vertices that are no sites the site nearest along edges; True when a helper's changed.
 
@@ -95,7 +95,7 @@ def label_helpers(net, kind, label, distance):  # type: ignore[no-untyped-def]
     return other
 
 
-@njit(types.boolean(NET, B1, I1, types.int64, I1, I1), cache=True, nogil=True)
+@njit(types.boolean(NET, B1, I1, types.int64, I1, I1), cache=True, nogil=True, error_model="numpy")
 def _name_corners(net, kind, label, f, name, place):  # type: ignore[no-untyped-def]
     """The up to three sites of face `f`, and which of them each corner is (-1: none); True where a helper is one.
 
@@ -121,7 +121,7 @@ def _name_corners(net, kind, label, f, name, place):  # type: ignore[no-untyped-
     return helper
 
 
-@njit(types.void(NET, types.int64, types.int64, I1, I1, types.boolean, _I2, _S2, B1), cache=True, nogil=True)
+@njit(types.void(NET, types.int64, types.int64, I1, I1, types.boolean, _I2, _S2, B1), cache=True, nogil=True, error_model="numpy")
 def _read_point(net, p, row, name, place, helper, sites, weights, trouble):  # type: ignore[no-untyped-def]
     """Write the binding of point `p` to `row`. `trouble`: 1 bound through a helper, 2 to nothing."""
     w0, w1, w2 = 0.0, 0.0, 0.0
@@ -143,7 +143,7 @@ def _read_point(net, p, row, name, place, helper, sites, weights, trouble):  # t
     trouble[row] = 2 if name[0] < 0 else (1 if helper else 0)
 
 
-@njit(types.void(I1, types.int64, I1, I1), cache=True, nogil=True)
+@njit(types.void(I1, types.int64, I1, I1), cache=True, nogil=True, error_model="numpy")
 def sort_points(home, count, ends, points):  # type: ignore[no-untyped-def]
     """Points 0 .. count face after face, those without one last; the ones of face f lie before ``ends[f + 1]``."""
     faces = len(ends) - 2
@@ -161,7 +161,7 @@ def sort_points(home, count, ends, points):  # type: ignore[no-untyped-def]
         ends[f + 1] += 1
 
 
-@njit(types.void(NET, B1, I1, _RI1, I1, I1, types.int64, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
+@njit(types.void(NET, B1, I1, _RI1, I1, I1, types.int64, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True, error_model="numpy")
 def read_faces(net, kind, label, given, ends, points, start, stop, order, sites, weights, trouble):  # type: ignore[no-untyped-def]
     """Write the binding of points of the faces start .. stop to the rows they were given in, and their rows to
     `order`, sorted by face. One face more than there are is that of points that have none."""
@@ -181,7 +181,7 @@ def read_faces(net, kind, label, given, ends, points, start, stop, order, sites,
             _read_point(net, points[at], row, name, place, helper, sites, weights, trouble)
 
 
-@njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True)
+@njit(types.int64(NET, B1, I1, _RI1, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True, error_model="numpy")
 def read_changed(net, kind, label, given, count, rows, sites, weights, trouble):  # type: ignore[no-untyped-def]
     """The same for the points of touched faces only, packed, and forget those faces; returns how many."""
     name, place = np.empty(3, np.int32), np.empty(3, np.int32)
@@ -203,7 +203,7 @@ def read_changed(net, kind, label, given, count, rows, sites, weights, trouble):
     return at
 
 
-@njit(types.int64(NET, types.int64, I1, F1, types.int64, F1, F1), cache=True, nogil=True)
+@njit(types.int64(NET, types.int64, I1, F1, types.int64, F1, F1), cache=True, nogil=True, error_model="numpy")
 def find_place(net, base, corners, weights, anchor, anchor_weights, out):  # type: ignore[no-untyped-def]
     """Where a place on a mesh triangle lies now: unfold faces until its corners' places are found, then blend.
 

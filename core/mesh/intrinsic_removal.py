@@ -16,7 +16,7 @@ from core.mesh.intrinsic_flips import FREE, I1, NET, area, enqueue, flip, legali
 from core.mesh.intrinsic_star import LARGEST_RING, RING, closes, fill, flatten, place, place_unflattened
 
 
-@njit(types.int64(NET, RING, types.int64, types.int64), cache=True, nogil=True)
+@njit(types.int64(NET, RING, types.int64, types.int64), cache=True, nogil=True, error_model="numpy")
 def _collect(net, ring, v, cap):  # type: ignore[no-untyped-def]
     """Gather the star of `v`; its degree, or -1 when that exceeds `cap`."""
     start = net.first[v]
@@ -37,7 +37,7 @@ def _collect(net, ring, v, cap):  # type: ignore[no-untyped-def]
             return d
 
 
-@njit(types.int64(NET, RING, types.int64, types.int64), cache=True, nogil=True)
+@njit(types.int64(NET, RING, types.int64, types.int64), cache=True, nogil=True, error_model="numpy")
 def _open_star(net, ring, v, cap):  # type: ignore[no-untyped-def]
     """Flip until the star of `v` is a disc with at least three spokes; its degree, or -1 when it will not."""
     for _ in range(24):
@@ -63,7 +63,7 @@ def _open_star(net, ring, v, cap):  # type: ignore[no-untyped-def]
     return -1
 
 
-@njit(types.boolean(NET, RING, types.int64), cache=True, nogil=True)
+@njit(types.boolean(NET, RING, types.int64), cache=True, nogil=True, error_model="numpy")
 def _ease(net, ring, d):  # type: ignore[no-untyped-def]
     """One flip that helps a star become flat: the edge that scaling would make non-Delaunay first.
 
@@ -88,7 +88,7 @@ def _ease(net, ring, d):  # type: ignore[no-untyped-def]
     return flip(net, ring.spoke[skew] if ring.inner[skew] > ring.inner[j] else ring.spoke[j])
 
 
-@njit(types.void(NET, RING, types.int64, types.int64, types.float64, types.float64), cache=True, nogil=True)
+@njit(types.void(NET, RING, types.int64, types.int64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy")
 def _relocate(net, ring, p, d, x, y):  # type: ignore[no-untyped-def]
     """Hang point `p` at position (x, y) of the layout into the new triangle it lies in (new faces use old spokes')."""
     best, w0, w1 = -1, 0.0, 0.0
@@ -105,7 +105,7 @@ def _relocate(net, ring, p, d, x, y):  # type: ignore[no-untyped-def]
     put_point(net, p, ring.spoke[best] // 3, 1.0 - w0 - w1, w0, w1)
 
 
-@njit(types.void(NET, RING, types.int64, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, RING, types.int64, types.int64), cache=True, nogil=True, error_model="numpy")
 def _move_points(net, ring, d, point):  # type: ignore[no-untyped-def]
     """Carry the points of the star, and the vertex itself as `point`, into the new triangles."""
     for n in range(d - 2):
@@ -135,7 +135,7 @@ def _move_points(net, ring, d, point):  # type: ignore[no-untyped-def]
         _relocate(net, ring, point, d, 0.0, 0.0)
 
 
-@njit(types.void(NET, RING, types.int64), cache=True, nogil=True)
+@njit(types.void(NET, RING, types.int64), cache=True, nogil=True, error_model="numpy")
 def _rewire(net, ring, d):  # type: ignore[no-untyped-def]
     """Write the new triangles into the faces of the star and free two of them."""
     for i in range(d):
@@ -183,7 +183,7 @@ def _rewire(net, ring, d):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.boolean(NET, RING, types.int64, types.int64, types.int64, types.boolean), cache=True, nogil=True
+    types.boolean(NET, RING, types.int64, types.int64, types.int64, types.boolean), cache=True, nogil=True, error_model="numpy"
 )
 def remove_vertex(net, ring, v, point, cap, forgiving):  # type: ignore[no-untyped-def]
     """Take vertex `v` out, restore Delaunay, and hang `point` (-1: none) where it was; False when it must wait.
@@ -224,7 +224,7 @@ def remove_vertex(net, ring, v, point, cap, forgiving):  # type: ignore[no-untyp
     return done
 
 
-@njit(types.int64(NET, RING, I1, types.int64), cache=True, nogil=True)
+@njit(types.int64(NET, RING, I1, types.int64), cache=True, nogil=True, error_model="numpy")
 def remove_vertices(net, ring, order, points):  # type: ignore[no-untyped-def]
     """Take out the vertices of `order`, in eight passes with a rising cap on degree.
 

@@ -56,7 +56,7 @@ def make_ring() -> Ring:
     return Ring._make([*whole, *real, np.empty((n, 3), np.int32), np.empty((n, 6))])
 
 
-@njit(types.float64(RING, types.int64, types.float64), cache=True, nogil=True)
+@njit(types.float64(RING, types.int64, types.float64), cache=True, nogil=True, error_model="numpy")
 def _angles(ring, d, scale):  # type: ignore[no-untyped-def]
     """Write the angle of every triangle around the vertex, spokes scaled; their sum, or -1 where one cannot close."""
     total = 0.0
@@ -71,7 +71,7 @@ def _angles(ring, d, scale):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(types.float64(RING, types.int64), cache=True, nogil=True)
+@njit(types.float64(RING, types.int64), cache=True, nogil=True, error_model="numpy")
 def flatten(ring, d):  # type: ignore[no-untyped-def]
     """Scale of the spokes that makes the angles around the vertex sum to 2 pi, or -1. Newton with halved steps."""
     u = 0.0
@@ -101,7 +101,7 @@ def flatten(ring, d):  # type: ignore[no-untyped-def]
     return exp(0.5 * u) if abs(total - 2.0 * pi) < 1e-7 else -1.0
 
 
-@njit(types.void(RING, types.int64, types.float64), cache=True, nogil=True)
+@njit(types.void(RING, types.int64, types.float64), cache=True, nogil=True, error_model="numpy")
 def place(ring, d, scale):  # type: ignore[no-untyped-def]
     """Positions of the ring from spoke lengths and ``ring.span``, angles scaled to a full turn."""
     total = 0.0
@@ -115,7 +115,7 @@ def place(ring, d, scale):  # type: ignore[no-untyped-def]
         angle += ring.span[i] * turn
 
 
-@njit(types.boolean(RING, types.int64), cache=True, nogil=True)
+@njit(types.boolean(RING, types.int64), cache=True, nogil=True, error_model="numpy")
 def place_unflattened(ring, d):  # type: ignore[no-untyped-def]
     """Lay out a star that cannot be made flat, sharing its angles out; False when two would be too wide."""
     total, wide = 0.0, 0
@@ -137,7 +137,7 @@ def place_unflattened(ring, d):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(types.float64(RING, types.int64, types.int64, types.int64, types.float64), cache=True, nogil=True)
+@njit(types.float64(RING, types.int64, types.int64, types.int64, types.float64), cache=True, nogil=True, error_model="numpy")
 def _lift(ring, i, j, k, sliver):  # type: ignore[no-untyped-def]
     """Height over the vertex of the plane of ear i, j, k on the paraboloid; infinite where thinner than `sliver`."""
     ax, ay, bx, by, cx, cy = ring.x[i], ring.y[i], ring.x[j], ring.y[j], ring.x[k], ring.y[k]
@@ -150,7 +150,7 @@ def _lift(ring, i, j, k, sliver):  # type: ignore[no-untyped-def]
     return up / turn
 
 
-@njit(types.boolean(RING, types.int64, types.float64), cache=True, nogil=True)
+@njit(types.boolean(RING, types.int64, types.float64), cache=True, nogil=True, error_model="numpy")
 def fill(ring, d, sliver):  # type: ignore[no-untyped-def]
     """Triangulate the ring polygon into ``ring.corner``; False when no positive triangulation is found."""
     for i in range(d):
@@ -180,7 +180,7 @@ def fill(ring, d, sliver):  # type: ignore[no-untyped-def]
     return _lift(ring, a, at, c, sliver) < np.inf
 
 
-@njit(types.boolean(RING, types.int64), cache=True, nogil=True)
+@njit(types.boolean(RING, types.int64), cache=True, nogil=True, error_model="numpy")
 def closes(ring, d):  # type: ignore[no-untyped-def]
     """True when every new triangle closes with the lengths it will have."""
     for n in range(d - 2):
