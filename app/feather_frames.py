@@ -45,9 +45,9 @@ def worse(one: Figures, other: Figures) -> Figures:
 
 
 def export_frame(
-    laid: Laid, frame: float, each: bool, evaluator: Evaluator
+    laid: Laid, frame: float, each: bool, evaluator: Evaluator, still: bool = True
 ) -> tuple[FeatherFrame, Figures]:
-    """One frame as it is written, and what crosses in it."""
+    """One frame as it is written, and what crosses in it; `still` when it is not one of many."""
     rows = shown_rows(laid)
     attributes = {name: laid.fields[name][rows] for name in EXPORTED if name in laid.fields}
     figures: Figures
@@ -56,7 +56,7 @@ def export_frame(
         made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], laid.layered.vanes[rows], attributes)
         figures = {}
     else:
-        found = instances(laid, evaluator.workers)
+        found = instances(laid, evaluator.workers, still)
         left = found.left
         made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
         figures = {

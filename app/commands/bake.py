@@ -100,7 +100,7 @@ def bake_frame(job: Job) -> Figures:
     skin = posed_document(kept.document, float(frame), kept.evaluator)[item.id]
     laid = kept.plumage.at_frame(
         kept.coat, keys_of(kept.document, kept.coat), item.mesh, skin, float(frame), float(kept.document.first_frame))
-    written, figures = export_frame(laid, float(frame), each, kept.evaluator)
+    written, figures = export_frame(laid, float(frame), each, kept.evaluator, still=False)
     with atomic_write(path) as temporary:
         writer = FeatherWriter(
             temporary, kept.coat.name, item.mesh, maker(), MATERIAL, True, kept.document.fps)

@@ -121,7 +121,7 @@ def _written(
                 if wanted is not None:
                     skin: Skin = posed_document(document, float(frame), evaluator)[item.id]
                     laid = plumage.at_frame(dressed.coat, dressed.keys, item.mesh, skin, float(frame))
-                written, made = export_frame(laid, frame, each, evaluator)
+                written, made = export_frame(laid, frame, each, evaluator, wanted is None)
             figures = worse(figures, made)
             with report.stage("export", f"writing frame {frame}"):
                 for writer in writers:

@@ -135,7 +135,7 @@ class FeatherWriter:
             self._coat = UsdGeom.Mesh.Define(self._stage, self._place)
             UsdShade.MaterialBindingAPI.Apply(self._coat.GetPrim()).Bind(self._material)
         _write_vanes(self._coat, vanes, time)
-        cells = (vanes.shape[1] - 1) * (vanes.shape[2] - 1)
+        cells = 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1)
         api = UsdGeom.PrimvarsAPI(self._coat)
         made = api.CreatePrimvar("feather_id", Sdf.ValueTypeNames.IntArray, UsdGeom.Tokens.uniform)
         made.Set(Vt.IntArray.FromNumpy(np.repeat(frame.ids, cells)), time)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
-from core.feather.coat.plumage import Laid
+from core.feather.coat.plumage import GIVE, Laid
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
 from core.workers import Workers
 
@@ -60,8 +60,12 @@ def left_crossing(laid: Laid, workers: Workers) -> Crossings:
     return crossings(kept, laid.skin.bvh, workers)
 
 
-def instances(laid: Laid, workers: Workers) -> Instances:
-    """The feathers shown as instances of quantised shapes."""
+def instances(laid: Laid, workers: Workers, still: bool = True) -> Instances:
+    """The feathers shown as instances of quantised shapes.
+
+    still : the coat is written once; in a frame of an animation feathers are only lifted, and by little, so that
+        nothing jumps from frame to frame.
+    """
     rows = shown_rows(laid)
     poses = laid.layered.poses[rows]
     length = poses[:, LENGTH]
@@ -89,7 +93,8 @@ def instances(laid: Laid, workers: Workers) -> Instances:
         np.ascontiguousarray(laid.feathers.frames[rows]), np.ascontiguousarray(laid.feathers.rank[rows]),
     )
     near = np.full((len(rows), 1), -1, np.int32)  # nobody follows: each has its place already
-    settled = layer(feathers, rigid, near, laid.skin.bvh, workers, bent_back=0.0)
+    give = None if still else np.full(len(rows), GIVE)
+    settled = layer(feathers, rigid, near, laid.skin.bvh, workers, may_shorten=still, bent_back=0.0, most=give)
     turns = quaternions(feathers.frames, settled.poses).astype(np.float32)
     scales = settled.poses[:, LENGTH].astype(np.float32)
     written = _instanced(feathers.own, feathers.roots, turns, scales)

@@ -67,13 +67,14 @@ class Crossings(NamedTuple):
 
 def layer(
     feathers: Feathers, base: NDArray[np.float64], near: NDArray[np.int32], bvh: Bvh, workers: Workers,
-    may_shorten: bool = True, bent_back: float = BENT_BACK,
+    may_shorten: bool = True, bent_back: float = BENT_BACK, most: NDArray[np.float64] | None = None,
 ) -> Layered:
     """Settle a whole coat from its base poses (N, 6).
 
     near : (N, K) int32, neighbours on the skin, see ``ground``. bvh : the skin in the same pose.
     may_shorten : at rest; in a frame of an animation only lifts change, as a length that changes would show.
     bent_back : share of an added lift that is bent back; 0 where shapes are given, as those of prototypes are.
+    most : (N,) float64, radians a feather may be lifted by; None for as much as it takes.
     """
     poses = raised(feathers, base, near, bvh, workers, bent_back) if may_shorten else base.copy()
     vanes = pose_vanes(feathers.own, poses, feathers.roots, feathers.frames, ranges=workers.ranges)
@@ -85,7 +86,7 @@ def layer(
     suspects[first[meet]] = True
     suspects[second[meet]] = True
     suspects |= skin_crossings(vanes, boxes, bvh, ranges=workers.ranges)
-    _settle(feathers, laid, suspects, bvh, may_shorten, bent_back)
+    _settle(feathers, laid, suspects, bvh, may_shorten, bent_back, most)
     return laid
 
 
@@ -217,7 +218,8 @@ def _pairs_of(
 
 
 def _settle(
-    feathers: Feathers, laid: Layered, suspects: NDArray[np.bool_], bvh: Bvh, may_shorten: bool, bent_back: float
+    feathers: Feathers, laid: Layered, suspects: NDArray[np.bool_], bvh: Bvh, may_shorten: bool, bent_back: float,
+    most: NDArray[np.float64] | None = None,
 ) -> None:
     if not suspects.any():
         return
@@ -226,5 +228,6 @@ def _settle(
     moved = np.zeros(len(suspects), np.bool_)
     settle_rows(
         order, feathers.rank, rows.start, rows.other, feathers.own, feathers.roots, feathers.frames, bvh.boxes,
-        bvh.children, bvh.corners, may_shorten, bent_back, suspects, moved, laid.poses, laid.vanes, laid.boxes,
+        bvh.children, bvh.corners, may_shorten, bent_back,
+        np.full(len(suspects), np.inf) if most is None else most, suspects, moved, laid.poses, laid.vanes, laid.boxes,
     )

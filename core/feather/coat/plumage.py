@@ -40,12 +40,13 @@ ROWS, COLUMNS = 8, 5  # of a vane as it is layered
 STANDING = 0.21  # radians, lift of feathers without keys
 SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
 BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
+GIVE = np.radians(1.4)  # by which a frame may lift a feather where the skin does not bend
 ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
 FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
 
 
 class Base(NamedTuple):
-    """Feathers before they settle.
+    """Feathers before they settle. give : (N,) float64, radians by which a frame may lift them beyond the rest.
 
     feathers : vanes, roots, frames and ranks. poses : (N, 6) float64. fields : named columns (N,) expressions read.
     """
@@ -53,6 +54,7 @@ class Base(NamedTuple):
     feathers: Feathers
     poses: NDArray[np.float64]
     fields: dict[str, Any]
+    give: NDArray[np.float64]
 
 
 class Laid(NamedTuple):
@@ -120,7 +122,8 @@ class Plumage:
             poses = base.poses + (rest.layered.poses - resting.poses)
             poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
             if coat.layered:
-                layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, may_shorten=False)
+                layered = layer(
+                    base.feathers, poses, bed.ground.near, skin.bvh, workers, may_shorten=False, most=base.give)
             else:
                 layered = _unlayered(base.feathers, poses, workers.ranges)
         if coat.proxies:
@@ -216,10 +219,13 @@ class Plumage:
             own = self._own(coat, fields, now, mesh, keys, bed)  # what is animated, at this frame alone
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
         positions, normals, frames = bed.positions, bed.normals, rest_frames
+        give = np.full(count, GIVE)
         if skin is not None:
             positions, frames, flow = _carried(mesh, bed, rest_frames, flow_frames, skin)
             normals = frames[:, 2].astype(np.float64)
-            bend_of = _curved(positions, flow, near, ranges)
+            resting, bend_of = bend_of, _curved(positions, flow, near, ranges)
+            # where the skin bends, feathers may rise with it; elsewhere so little that nothing is seen to jump
+            give = GIVE + fields["length"] * np.abs(bend_of - resting).max(axis=1)
         ids, seed = bed.places.ids, _seed(coat)
         spread = [coat.variation * (2.0 * rand(ids, seed + 301 + k) - 1.0) for k in range(4)]
         wind = _unit(np.asarray(coat.wind_direction, np.float64)[None])[0] * np.ones((count, 1))
@@ -238,13 +244,17 @@ class Plumage:
         poses[:, ROLL] = numbers["roll"] * sides + FAN[2] * spread[2] * 0.5
         poses[:, LENGTH] = length
         curl = fields["turn"] + numbers["curl"] - 0.5 * numbers["puff"] - 0.5 * up
-        poses[:, BEND] = np.clip(bend_of[:, 1] - fields["skin_turn"] - curl / length, -1.2 / length, 1.6 / length)
-        poses[:, CUP] = np.clip(bend_of[:, 0], -0.5 / length, 2.0 / length)
+        # what a vane is curved by itself follows a curved body as well
+        across, along = (self._remember("own curves", lambda: _own_curves(own), own) / length[:, None]).T
+        bend = bend_of[:, 1] - np.clip(along, 0.0, np.maximum(bend_of[:, 1], 0.0)) - curl / length
+        cup = bend_of[:, 0] - np.clip(across, 0.0, np.maximum(bend_of[:, 0], 0.0))
+        poses[:, BEND] = np.clip(bend, -1.2 / length, 1.6 / length)
+        poses[:, CUP] = np.clip(cup, -0.5 / length, 2.0 / length)
         poses[:, TWIST] = np.clip(bend_of[:, 2], -0.6 / length, 0.6 / length)
         frames = _turned(frames, yaw)
         roots = positions + (ABOVE_SKIN * bed.ground.spacing[:, None] * normals).astype(np.float32)
         feathers = Feathers(own, np.ascontiguousarray(roots, np.float32), frames, rank)
-        return Base(feathers, poses, fields)
+        return Base(feathers, poses, fields, give)
 
     def _directions(
         self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None
@@ -277,7 +287,6 @@ class Plumage:
             fields: dict[str, Any] = {
                 "id": bed.places.ids, "tract": bed.tract, "age": bed.age, "spacing": spacing,
                 "length": coat.overlap * spacing, "lift": np.full(count, STANDING), "turn": np.zeros(count),
-                "skin_turn": np.zeros(count),
             }
             if mesh.uvs is not None:
                 fields["u"], fields["v"] = bed.roots.uvs[:, 0], bed.roots.uvs[:, 1]
@@ -432,6 +441,16 @@ def _limited(length: NDArray[np.float64], curved: NDArray[np.float64]) -> NDArra
     """Factor (N,) on lengths where the body bends too much below them for a feather to follow it."""
     tight = np.maximum(np.abs(curved[:, 0]), np.abs(curved[:, 1]))
     return np.asarray(1.0 / np.sqrt(1.0 + (length * tight / BODY) ** 2))
+
+
+def _own_curves(own: NDArray[np.float32]) -> NDArray[np.float64]:
+    """How vanes (N, R, C, 3) at length 1 curve by themselves, (N, 2), across and along, towards the skin above 0."""
+    x2, y2 = own[..., 0].astype(np.float64) ** 2, own[..., 1].astype(np.float64) ** 2
+    z = own[..., 2].astype(np.float64)
+    a, b, c = (x2 * x2).sum((1, 2)), (x2 * y2).sum((1, 2)), (y2 * y2).sum((1, 2))
+    p, q = (x2 * z).sum((1, 2)), (y2 * z).sum((1, 2))
+    rest = np.maximum(a * c - b * b, 1e-30)
+    return np.stack([-2.0 * (c * p - b * q) / rest, -2.0 * (a * q - b * p) / rest], axis=1)
 
 
 def _frames_of(directions: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -146,6 +146,7 @@ def along_rows(
     area = 0.5 * float(np.linalg.norm(normals, axis=1).sum())
     guess = max(np.sqrt(area / count), reach * 1e-4)
     values = np.ascontiguousarray(values, np.float64)
+    triangles = np.ascontiguousarray(triangles, np.int32)
 
     def lay(h: float) -> int:
         first = float(used.min()) + 0.25 * ratio * h

@@ -84,18 +84,20 @@ def _changed(base, lift, roll, length, bent_back, out):  # type: ignore[no-untyp
     types.void(
         I32_1D, types.Array(types.float64, 1, "C", readonly=True), I32_1D, I32_1D,
         F32_4D, F32_2D, F32_3D, F32_2D, I32_2D, F32_2D, types.boolean, types.float64,
+        types.Array(types.float64, 1, "C", readonly=True),
         types.boolean[::1], types.boolean[::1], types.float64[:, ::1], types.float32[:, :, :, ::1],
         types.float32[:, :, ::1],
     ),
     cache=True, nogil=True,
 )
 def settle_rows(  # type: ignore[no-untyped-def]
-    order, rank, start, other, own_vanes, roots, frames, nodes, children, corners, may_shorten, bent_back,
+    order, rank, start, other, own_vanes, roots, frames, nodes, children, corners, may_shorten, bent_back, most,
     suspect, moved, poses, vanes, boxes
 ):
     """Settle the rows of `order` (n,) int32, lowest first.
 
     bent_back : share of an added lift that is taken back by bending the feather down; 0 keeps shapes as they are.
+    most : (N,) float64, radians a feather may be lifted by; what does not suffice then stays as it is.
     suspect : (N,) bool, found crossing (or to be looked at); moved : (N,) bool, written where a pose was changed.
     poses, vanes, boxes : as they are, written where they change.
     """
@@ -134,8 +136,12 @@ def settle_rows(  # type: ignore[no-untyped-def]
         found = False
         for a in range(len(LENGTHS) if may_shorten else 1):
             for b in range(len(LIFTS)):
-                for c in range(len(ROLLS) if b % 2 == 0 else 1):
-                    _changed(base, LIFTS[b], ROLLS[c], LENGTHS[a], bent_back, trial)
+                if b > 0 and LIFTS[b - 1] >= most[i]:
+                    break
+                lift = min(LIFTS[b], most[i])
+                # in a frame nothing may jump: a roll would
+                for c in range(len(ROLLS) if may_shorten and b % 2 == 0 else 1):
+                    _changed(base, lift, ROLLS[c], LENGTHS[a], bent_back, trial)
                     pose_vane(own_vanes[i], trial, roots[i], frames[i], vane)
                     strip_boxes(vane, own)
                     last = _blocked(
@@ -146,7 +152,7 @@ def settle_rows(  # type: ignore[no-untyped-def]
                     found = True
                     best[:] = trial
                     if b > 0 and c == 0:
-                        low, high = LIFTS[b - 1], LIFTS[b]
+                        low, high = LIFTS[b - 1], lift
                         hit = -3
                         for _ in range(HALVINGS):
                             middle = 0.5 * (low + high)
