@@ -59,8 +59,7 @@ def solve_tracks(
     shot = shot_of(solution, names)
     with telling.stage("write", "writing"):
         for path in outputs:
-            with atomic_write(path) as beside:
-                write_shot(beside, path.suffix.lower(), shot, {"kind": told.kind, "rms_px": told.rms_px})
+            write_shot(path, shot, {"kind": told.kind, "rms_px": told.rms_px})
         if page is not None:
             from app.solve_report import write_report
 

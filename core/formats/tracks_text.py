@@ -181,7 +181,7 @@ def read_nuke(text: str, size: Size, name: str) -> Tracks:
     """Nuke: the curves of the knobs track1 to track4 of every Tracker3 node."""
     rows: Rows = {}
     for label, x, y in NUKE_TRACK.findall(text):
-        curves = [_curve(words, name) for words in (x, y)]
+        curves = [nuke_curve(words, name) for words in (x, y)]
         both = sorted(curves[0].keys() & curves[1].keys())
         rows[_free(label, rows)] = [(frame, curves[0][frame], curves[1][frame]) for frame in both]
     return tracks_of(rows, size, name, _ours_from_corner_up)
@@ -204,7 +204,7 @@ def write_nuke(tracks: tuple[Track, ...], size: Size) -> str:
     return "".join(nodes)
 
 
-def _curve(words: str, name: str) -> dict[float, float]:
+def nuke_curve(words: str, name: str) -> dict[float, float]:
     """A curve of Nuke: x and a number set the frame, every value counts it on by one."""
     values: dict[float, float] = {}
     frame = 1.0

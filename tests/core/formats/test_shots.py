@@ -1,0 +1,146 @@
+import json
+import re
+import struct
+
+import numpy as np
+import pytest
+from pxr import Usd
+from scipy.spatial.transform import Rotation
+
+from core.errors import UserError
+from core.formats.shot_file import read_shot, write_shot
+from core.match.lens import start_lens
+from core.match.solve.shot import Shot
+
+SIZE = (1920, 1080)
+
+
+def _shot(model: str = "brown", zoom: bool = False, bent: bool = True) -> Shot:
+    rng = np.random.default_rng(4)
+    t = np.linspace(0.0, 1.0, 12)
+    rotation = Rotation.from_euler("yxz", np.stack([-0.3 + t, 0.4 * t, 2.0 * t], axis=1)).as_matrix()
+    centres = np.stack([t, np.sin(3 * t), 0.2 * t], axis=1)
+    focal = 1600.0 * (1.0 + 0.4 * t if zoom else np.ones(12))
+    lens = start_lens(focal[0], *SIZE, model)
+    if bent:
+        lens[1:3] = -0.03, 0.01
+    translation = -np.einsum("fij,fj->fi", rotation, centres)
+    seen = rng.uniform([-0.4, -0.2, 6.0], [0.4, 0.2, 12.0], (30, 3))
+    points = (seen * [[8.0, 8.0, 1.0]] - translation[5]) @ rotation[5]
+    return Shot(SIZE, np.arange(1001, 1013, dtype=np.int32), rotation, translation, focal, lens, points,
+                tuple(f"t {k}" for k in range(30)))
+
+
+def _same_pictures(a: Shot, b: Shot) -> None:
+    np.testing.assert_array_equal(a.frames, b.frames)
+    for row in range(len(a.frames)):
+        ahead = a.points[(a.points @ a.rotation[row].T + a.translation[row])[:, 2] > 1.0]
+        np.testing.assert_allclose(a.pixels(row, ahead), b.pixels(row, ahead), atol=0.01)
+
+
+@pytest.mark.parametrize(("name", "model", "zoom"), [
+    ("a.usda", "fisheye", False), ("a.usdc", "brown", True), ("cameras.txt", "brown", False),
+    ("cameras.txt", "fisheye", True), ("cameras.bin", "brown", True), ("cameras.bin", "fisheye", False),
+])  # fmt: skip
+def test_what_is_written_is_read_again(name, model, zoom, tmp_path):
+    made = _shot(model, zoom)
+    write_shot(tmp_path / name, made, {})
+    back = read_shot(tmp_path / name, None)
+    _same_pictures(made, back)
+    np.testing.assert_allclose(back.points, made.points, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["a.nk", "a.chan"])
+def test_nuke_has_the_straight_camera(name, tmp_path):
+    made = _shot(zoom=True, bent=False)
+    write_shot(tmp_path / name, made, {})
+    _same_pictures(made, read_shot(tmp_path / name, SIZE))
+
+
+def test_nuke_turns_in_the_order_it_says(tmp_path):
+    """Its rotations done one after the other: z, then x, then y."""
+    made = _shot(bent=False)
+    write_shot(tmp_path / "a.chan", made, {})
+    row = np.loadtxt(tmp_path / "a.chan")[7]
+    x, y, z = np.radians(row[4:7])
+    c, s = np.cos, np.sin
+    about_x = np.array([[1, 0, 0], [0, c(x), -s(x)], [0, s(x), c(x)]])
+    about_y = np.array([[c(y), 0, s(y)], [0, 1, 0], [-s(y), 0, c(y)]])
+    about_z = np.array([[c(z), -s(z), 0], [s(z), c(z), 0], [0, 0, 1]])
+    np.testing.assert_allclose(about_y @ about_x @ about_z, made.up()[0][7, :3, :3], atol=1e-9)
+
+
+def test_mayas_curves_place_the_camera(tmp_path):
+    made = _shot(zoom=True, bent=False)
+    write_shot(tmp_path / "a.ma", made, {})
+    text = (tmp_path / "a.ma").read_text()
+    curves = {}
+    found = re.findall(r'animCurve\w+ -n "filoplume_camera_(\w+)";.*?ktv\[[\d:]+\]"([^;]*);', text, re.S)
+    for name, keys in found:
+        curves[name] = dict(np.array(keys.split(), float).reshape(-1, 2))
+    frame = 1008
+    turn = [curves[f"r{axis}"][frame] for axis in "xyz"]
+    matrix = made.up()[0][7]
+    np.testing.assert_allclose(Rotation.from_euler("xyz", turn, degrees=True).as_matrix(), matrix[:3, :3], atol=1e-9)
+    np.testing.assert_allclose([curves[f"t{axis}"][frame] for axis in "xyz"], matrix[:3, 3], atol=1e-9)
+    across = float(re.search(r'"\.cap" -type "double2" (\S+)', text)[1]) * 25.4
+    assert curves["fl"][frame] / across * SIZE[0] == pytest.approx(made.focal[7], rel=1e-9)
+
+
+def test_a_camera_off_its_centre_is_refused_where_it_cannot_be_said(tmp_path):
+    made = _shot()
+    made.lens[4] += 3.0
+    with pytest.raises(UserError, match=r"3\.0 px off"):
+        write_shot(tmp_path / "a.nk", made, {})
+
+
+def test_a_stage_of_another_program_is_read(tmp_path):
+    made = _shot(bent=False)
+    made.lens[4:6] += 12.0, -7.0
+    write_shot(tmp_path / "a.usda", made, {})
+    stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
+    stage.GetDefaultPrim().ClearCustomData()
+    stage.Export(str(tmp_path / "b.usda"))
+    _same_pictures(made, read_shot(tmp_path / "b.usda", None))
+
+
+def test_bundler_is_read(tmp_path):
+    made = _shot()
+    flip = np.diag([1.0, -1.0, -1.0])
+    lines = ["# Bundle file v0.3", f"{len(made.frames)} {len(made.points)}"]
+    for turn, shift in zip(made.rotation, made.translation, strict=True):
+        lines += [f"1600 {made.lens[1]} {made.lens[2]}", *(" ".join(map(repr, row)) for row in (flip @ turn).tolist())]
+        lines.append(" ".join(map(repr, (flip @ shift).tolist())))
+    for place in made.points.tolist():
+        lines += [" ".join(map(repr, place)), "0 0 0", "2 0 5 0.0 0.0 1 6 1.0 1.0"]
+    (tmp_path / "bundle.out").write_text("\n".join(lines))
+    back = read_shot(tmp_path / "bundle.out", SIZE)
+    _same_pictures(made._replace(frames=back.frames), back)
+    np.testing.assert_allclose(back.points, made.points)
+
+
+def test_opensfm_is_read(tmp_path):
+    made = _shot()
+    shots = {
+        f"plate.{frame}.jpg": {
+            "camera": "c", "rotation": Rotation.from_matrix(turn).as_rotvec().tolist(), "translation": shift.tolist()}
+        for frame, turn, shift in zip(made.frames, made.rotation, made.translation, strict=True)
+    }  # fmt: skip
+    camera = {"projection_type": "perspective", "width": 1920, "height": 1080, "focal": 1600 / 1920}
+    camera |= {"k1": -0.03, "k2": 0.01}
+    points = {str(k): {"coordinates": place} for k, place in enumerate(made.points.tolist())}
+    (tmp_path / "r.json").write_text(json.dumps([{"cameras": {"c": camera}, "shots": shots, "points": points}]))
+    _same_pictures(made, read_shot(tmp_path / "r.json", None))
+
+
+@pytest.mark.parametrize(("name", "data"), [
+    ("cameras.txt", b"1 OPENCV 10"), ("cameras.bin", struct.pack("<Q", 1 << 60)),
+    ("a.nk", b"Camera2 {\n translate {{curve x}}\n}\n"), ("a.nk", b""), ("a.chan", b"1 2 3"), ("a.chan", b""), ("a.out", b"99999999999 1"), ("a.json", b"[]"),
+    ("a.json", b"[[["), ("a.usda", b"#usda 1.0\n"), ("a.abc", b""),
+])  # fmt: skip
+def test_broken_files_are_refused_in_words(name, data, tmp_path):
+    for part in ("images", "points3D"):
+        (tmp_path / f"{part}.{name[-3:]}").write_bytes(b"")
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(UserError):
+        read_shot(tmp_path / name, SIZE)
