@@ -15,13 +15,15 @@ from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
 from core.formats.mask_file import read_masks
+from core.formats.plane_file import read_planes, write_planes
 from core.formats.plate_file import PlateFrames, read_plate
 from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.mix import mixed
 from core.image.plate import ChannelMix
 from core.match.outline import held_off
-from core.match.track import MODELS, Track, TrackSettings
+from core.match.plane_tracker import plane_steps
+from core.match.track import MODELS, PlaneTrack, Track, TrackSettings
 from core.match.tracker import Tracking
 from core.workers import Workers
 
@@ -31,6 +33,8 @@ def command(
     tracks: Annotated[Path | None, typer.Option(help="Keys to follow: .json, or a file of another program.")] = None,
     tracks_out: Annotated[Path | None, typer.Option(help="Where the tracks go; the suffix says how.")] = None,
     masks: Annotated[Path | None, typer.Option(help="Outlines that hold tracks off, keyed over frames: .json.")] = None,
+    planes: Annotated[Path | None, typer.Option(help="Flat pieces to follow as corner pins: .json.")] = None,
+    planes_out: Annotated[Path | None, typer.Option(help="Where the corners of the planes go: .json.")] = None,
     auto: Annotated[int, typer.Option(min=0, max=20_000, help="Find so many features and keep as many alive.")] = 0,
     pattern: Annotated[int, typer.Option(min=7, max=201, help="Side of the pattern in pixels.")] = 21,
     search: Annotated[int, typer.Option(min=2, max=500, help="How far around the place foretold to look, in pixels.")] = 30,
@@ -53,11 +57,13 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Follow points through a plate: given keys, features found by themselves, or both."""
-    if tracks is None and not auto:
-        raise typer.BadParameter("say what to track: --tracks KEYS.json, or --auto 40")
+    if tracks is None and not auto and planes is None:
+        raise typer.BadParameter("say what to track: --tracks KEYS.json, --auto 40, or --planes PLANES.json")
+    if (planes is None) != (planes_out is None):
+        raise typer.BadParameter("planes go in and out: --planes PLANES.json --planes-out CORNERS.json")
     if model != "auto" and model not in MODELS:
         raise typer.BadParameter(f"choose auto or one of {', '.join(MODELS)}", param_hint="--model")
-    _check_outputs(tracks_out, report)
+    _check_outputs(tracks_out, report, planes_out)
     if (output or solve_report) and not solved:
         raise typer.BadParameter("-o and --solve-report are of a solved camera: add --solve", param_hint="--output")
     asked = options_of(focal_px, free_focal, zoom, nodal, lens)
@@ -73,6 +79,7 @@ def command(
                 given = read_tracks(tracks, size=(film.width, film.height)) if tracks is not None else Tracks(())
                 keyed = _keyed(given, (film.width, film.height), span, warnings)
                 shapes = read_masks(masks) if masks is not None else ()
+                flat = read_planes(planes) if planes is not None else ()
             mix = ChannelMix(channels="grey" if grey else "rgb", log=log, denoise=denoise, contrast=contrast)
             source = PlateFrames(film, decoder)
             settings = TrackSettings(pattern=pattern | 1, search=search, model=model, blur=blur)
@@ -90,13 +97,19 @@ def command(
                 for step in tracking.steps():
                     telling.words(f"tracking, frame {step.frame}: {len(step.tracks)} tracks")
                 seconds = time.perf_counter() - begin
+                pins = tuple(_followed(plane, read, span, settings, workers, hold, telling) for plane in flat)
                 made = tracking.tracks()
             warnings += _film_warnings(film.missing, source.broken, span)
-            warnings += _track_warnings(made, span)
+            warnings += _track_warnings(made, span) + [
+                f"plane {plane.name} is seen on {len(plane.frames)} of {len(span)} frames"
+                for plane in pins if len(plane.frames) < len(span)]
             with telling.stage("write", "writing"):
                 if tracks_out is not None:
                     with atomic_write(tracks_out) as beside:
                         write_tracks(beside, Tracks(made, (film.width, film.height), (span[0], span[-1])), tracks_out.suffix)
+                if planes_out is not None:
+                    with atomic_write(planes_out) as beside:
+                        write_planes(beside, pins, (film.width, film.height))
                 if report is not None:
                     from app.track_report import write_report
 
@@ -113,9 +126,9 @@ def command(
         workers.close()
     for words in warnings:
         telling.note(words)
-    written = [str(path) for path in (tracks_out, report) if path is not None]
+    written = [str(path) for path in (tracks_out, planes_out, report) if path is not None]
     result = {
-        "plate": film.name, "size": [film.width, film.height], "frames": [span[0], span[-1]], "tracks": len(made),
+        "plate": film.name, "size": [film.width, film.height], "frames": [span[0], span[-1]], "tracks": len(made), "planes": len(pins),
         "observations": sum(len(track.frames) for track in made), "seconds": telling.seconds,
         "ms_per_track_frame": round(1e3 * seconds / max(1, tracking.observations), 4), "warnings": warnings, "outputs": written,
         "peak_mb": peak_megabytes(),
@@ -128,12 +141,24 @@ def command(
     telling.done(result, lines)
 
 
-def _check_outputs(tracks_out: Path | None, report: Path | None) -> None:
+def _followed(
+    drawn: PlaneTrack, read: Any, span: range, settings: TrackSettings, workers: Workers, hold: Any, telling: Report
+) -> PlaneTrack:
+    """The plane after it was followed through the plate."""
+    plane = drawn
+    for plane in plane_steps(drawn, read, span, settings=settings, ranges=workers.ranges, hold=hold):
+        telling.words(f"tracking plane {plane.name}, {len(plane.frames)} frames")
+    return plane
+
+
+def _check_outputs(tracks_out: Path | None, report: Path | None, planes_out: Path | None) -> None:
+    if planes_out is not None and planes_out.suffix.lower() != ".json":
+        raise UserError(f"{planes_out.name}: planes are written as .json; give a name that ends so")
     if tracks_out is not None and tracks_out.suffix.lower() not in SUFFIXES:
         raise UserError(f"{tracks_out.name}: tracks are written as {', '.join(SUFFIXES)}; choose one of these suffixes")
     if report is not None and report.suffix.lower() not in (".html", ".htm"):
         raise UserError(f"{report.name}: the report is a page; give a name that ends in .html")
-    for path in (tracks_out, report):
+    for path in (tracks_out, report, planes_out):
         if path is not None and not path.resolve().parent.is_dir():
             raise UserError(f"the folder {path.resolve().parent} does not exist; make it first")
 

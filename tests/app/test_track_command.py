@@ -90,3 +90,35 @@ def test_flow_goes_into_a_file(plate, tmp_path):
     truth = place(POINT, 1) - POINT
     np.testing.assert_allclose(flow[62, 70], truth, atol=0.15)
     assert json.loads(words)["size"] == [160, 120]
+
+
+def test_a_plane_is_followed_as_a_corner_pin(plate, tmp_path):
+    drawn, out = tmp_path / "drawn.json", tmp_path / "corners.json"
+    square = [[50.0, 40.0], [90.0, 40.0], [90.0, 80.0], [50.0, 80.0]]
+    drawn.write_text(json.dumps({"planes": [{"name": "wall", "frame": 1001, "outline": square}]}))
+    code, words, error = filoplume("track", plate, "--planes", drawn, "--planes-out", out, "--json")
+    assert code == 0, error
+    assert json.loads(words)["planes"] == 1
+    (plane,) = json.loads(out.read_text())["planes"]
+    assert plane["name"] == "wall"
+    assert [row[0] for row in plane["frames"]] == [1001, 1002, 1003, 1004, 1007, 1008]
+    for number, corners, error, score in plane["frames"]:
+        wanted = [place(np.array(corner), number - 1001) for corner in square]
+        assert np.linalg.norm(np.array(corners) - wanted, axis=1).max() < 0.6
+        assert error < 1.0
+        assert score > 0.5
+
+
+@pytest.mark.parametrize(("text", "word"), [
+    ("{", "no file of planes"),
+    ('{"planes": [{"frame": 1001, "outline": [[1, 2]]}]}', "outline"),
+    ('{"planes": [{"frame": 77, "outline": [[1, 2], [30, 2], [1, 40]]}]}', "77"),
+    ('{"planes": [{"frame": 1001, "outline": [[1, 2], [1e999, 2], [1, 40]]}]}', "planes"),
+])
+def test_planes_that_cannot_be_followed_are_refused_in_a_sentence(plate, tmp_path, text, word):
+    (tmp_path / "drawn.json").write_text(text)
+    code, _, error = filoplume(
+        "track", plate, "--planes", tmp_path / "drawn.json", "--planes-out", tmp_path / "o.json", "--json")
+    assert code == 1
+    assert word in error
+    assert not (tmp_path / "o.json").exists()

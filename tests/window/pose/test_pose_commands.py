@@ -21,7 +21,7 @@ from core.record import freeze
 from tests.tools.pose_scenes import document, strip, turned
 from tests.window.conftest import Opened
 from tests.window.host import Host
-from tools import pose_edits
+from tools import pose_edits, posing_edits
 from tools.pose.actions import ACTIONS
 from tools.skin_edits import lock_joints
 
@@ -57,6 +57,7 @@ AT_A_SCULPT = ("mirror_sculpt", "merge_poses", "delete_pose")
 FIRST = {  # what makes room for an action to do something
     "mirror_weights": lambda d: pose_edits.select_joints(d, 1, ()),
     "unlock_joints": lambda d: lock_joints(d, 1, ("lid",)),
+    "delete_pose_key": lambda d: posing_edits.key_pose(d, 1, LEFT, 1001.0),
     "free_joints": lambda d: pose_edits.set_constraints(d, 1, [Constraint(joint="lid", kind="limit")]),
     "forget_pose": lambda d: pose_edits.hold_pose(d, 1, d.meshes[0].library[0]),
     "prune_weights": lambda d: with_mesh(d, _spread(d)),
