@@ -9,6 +9,7 @@ import numpy as np
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat, Placement
+from core.feather.presets import load_bird
 from core.groom.dress import skin_flow
 from core.groom.groom import Coat, Groom
 from core.groom.guides import Guides
@@ -43,6 +44,7 @@ def dress_feathers(
     UserError
         The mesh has no surface to grow on.
     """
+    load_bird(preset)  # one that does not exist is said before any work
     skin = skin_at_rest(mesh, evaluator)
     if not skin.diagonal > 0.0 or not len(skin.triangles.vertices):
         raise UserError("the mesh has no surface to grow feathers on")

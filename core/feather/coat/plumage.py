@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from core import value as values
 from core.curve import Curve
 from core.evaluator import Evaluator
-from core.feather.attributes import defaults
 from core.feather.coat.bed import Bed, bind_to_keys, field_directions, make_bed
 from core.feather.coat.coat import FEATHER_FIELDS, FEATHER_VALUES, FeatherCoat
 from core.feather.coat.crossing import vane_boxes
@@ -26,6 +25,7 @@ from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
 from core.feather.coat.proxy import apply_proxies
+from core.feather.presets import load_bird, preset_values
 from core.feather.vane import SHAPE_COLUMNS, vane_grids
 from core.groom.groom import Groom, Map
 from core.groom.maps import sample_map
@@ -214,7 +214,7 @@ class Plumage:
         now = rest_frame if frame is None else frame
         own = self._remember(
             "own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields, coat.attributes, coat.width,
-            None if keys is None else keys.maps)
+            coat.preset, None if keys is None else keys.maps)
         if (now != rest_frame and any(moves(item.value) for item in coat.attributes)) or moves(coat.width):
             own = self._own(coat, fields, now, mesh, keys, bed)  # what is animated, at this frame alone
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
@@ -313,7 +313,11 @@ class Plumage:
         self, coat: FeatherCoat, fields: dict[str, Any], frame: float, mesh: Mesh, keys: Groom | None, bed: Bed
     ) -> NDArray[np.float32]:
         """Vanes of all feathers in their own frames, at length 1."""
-        table = np.tile(defaults()[: len(SHAPE_COLUMNS)], (len(bed.places.ids), 1))
+        worn = load_bird(coat.preset).feathers
+        table = np.tile(preset_values(worn["body"])[: len(SHAPE_COLUMNS)], (len(bed.places.ids), 1))
+        for number, tract in enumerate(coat.tracts):
+            if tract.name in worn:  # a tract called as a part of the bird wears what that part wears
+                table[bed.tract == number + 1] = preset_values(worn[tract.name])[: len(SHAPE_COLUMNS)]
         for name, column in SHAPE_COLUMNS.items():
             if name in fields:
                 table[:, column] = fields[name]
