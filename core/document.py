@@ -13,6 +13,7 @@ from core.groom.groom import Groom
 from core.image.plate import Plate
 from core.match.outline import Mask
 from core.match.photomodel.records import Photomodel
+from core.match.solved import SolvedCamera
 from core.match.track import PlaneTrack, Track
 from core.mesh.mesh import Mesh
 from core.pose.pose import Pose
@@ -29,6 +30,7 @@ class MeshObject(Record):
     """A mesh in the document.
 
     id : stable, unique in the document.
+    source : path of the file it was read from, to read it again when it was updated; "" for none.
     rig : what moves it, or None for a mesh at rest.
     correctives : what was sculpted at poses of the rig, or None.
     pose : the pose held in the view, None for the clip at the frame. library : poses kept for later, by name.
@@ -41,6 +43,7 @@ class MeshObject(Record):
     id: int
     name: str
     mesh: Mesh
+    source: str = ""
     rig: Rig | None = None
     correctives: Correctives | None = None
     pose: Pose | None = None
@@ -58,6 +61,8 @@ class MeshObject(Record):
 
     def __post_init__(self) -> None:
         text(self, "name")
+        if self.source:
+            text(self, "source", longest=4096)
         number(self, "id", least=0, most=2**31 - 1)
         if self.rig is not None and len(self.rig.skin.joints) != len(self.mesh.points):
             raise ValueError(f"MeshObject.rig moves {len(self.rig.skin.joints)} vertices of {len(self.mesh.points)}")
@@ -78,7 +83,7 @@ class Document(Record):
     meshes, grooms, feathers, plates, tracks, planes, masks : each with ids unique among their kind; the last three
         are of a plate. The keys of feathers are the guides of a groom.
     track_selection : ids of the selected tracks, the active one last; ids of deleted ones mean nothing.
-    photomodels : models from photographs, each with an id of its own.
+    photomodels : models from photographs, each with an id of its own. solves : cameras of plates, one of each at most.
     """
 
     unit: Annotated[str, field(
@@ -106,6 +111,7 @@ class Document(Record):
     masks: tuple[Mask, ...] = ()
     track_selection: tuple[int, ...] = ()
     photomodels: tuple[Photomodel, ...] = ()
+    solves: tuple[SolvedCamera, ...] = ()
 
     def __post_init__(self) -> None:
         if self.unit not in METRES_PER_UNIT:
@@ -127,6 +133,10 @@ class Document(Record):
             for item in items:
                 if item.plate_id not in plate_ids:
                     raise ValueError(f"Document.{kind}: the plate {item.plate_id} of {item.name!r} does not exist")
+        if len({solve.plate_id for solve in self.solves}) != len(self.solves):
+            raise ValueError("Document.solves holds two cameras of the same plate")
+        if not {solve.plate_id for solve in self.solves} <= plate_ids:
+            raise ValueError("Document.solves holds a camera of a plate that does not exist")
         if len({model.id for model in self.photomodels}) != len(self.photomodels):
             raise ValueError("Document.photomodels holds two of the same id")
         for model in self.photomodels:

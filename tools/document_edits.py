@@ -60,10 +60,10 @@ def import_mesh(document: Document, path: str | os.PathLike[str], unit: str | No
     return add_mesh(document, found.mesh, found.name)
 
 
-def add_mesh(document: Document, mesh: Mesh, name: str) -> Document:
-    """The document with another mesh at its end, under a name of its own."""
+def add_mesh(document: Document, mesh: Mesh, name: str, source: str = "") -> Document:
+    """The document with another mesh at its end, under a name of its own. source : the file it was read from."""
     named = _free_name(name, [item.name for item in document.meshes])
-    return with_mesh(document, MeshObject(id=free_id(document.meshes), name=named, mesh=mesh))
+    return with_mesh(document, MeshObject(id=free_id(document.meshes), name=named, mesh=mesh, source=source))
 
 
 def remove_mesh(document: Document, mesh_id: int) -> Document:
@@ -148,10 +148,24 @@ def replace_mesh(document: Document, mesh_id: int, mesh: Mesh) -> Document:
 
 
 def reload_mesh(
-    document: Document, mesh_id: int, path: str | os.PathLike[str], unit: str | None = None, up: str | None = None
+    document: Document, mesh_id: int, path: str | os.PathLike[str] | None = None, unit: str | None = None,
+    up: str | None = None,
 ) -> Document:
-    """The document with an updated file read in place of a mesh, the hair kept. In a window read the file in a job."""
-    return replace_mesh(document, mesh_id, read_mesh(Path(path), unit=unit, up=up).mesh)
+    """The document with an updated file read in place of a mesh, the hair kept. In a window read the file in a job.
+
+    path : of the file, which the mesh remembers from now on; None for the one it was read from.
+    """
+    source = find_mesh(document, mesh_id).source if path is None else os.path.abspath(path)
+    if not source:
+        raise UserError("It is not known which file this mesh was read from; name the file.")
+    return set_mesh_source(replace_mesh(document, mesh_id, read_mesh(Path(source), unit=unit, up=up).mesh),
+                           mesh_id, source)
+
+
+def set_mesh_source(document: Document, mesh_id: int, source: str) -> Document:
+    """The document with another file remembered as the one a mesh is read from."""
+    item = find_mesh(document, mesh_id)
+    return document if item.source == source else with_mesh(document, item.replace(source=source))
 
 
 # grooms

@@ -136,7 +136,7 @@ class MainWindow(QMainWindow):
 
     def _make_column(self) -> Column:
         memory, column = FoldMemory(self._folder), Column()
-        self.outliner = Outliner(self.desk, reload=lambda mesh_id: self.files.reload_mesh(mesh_id=mesh_id))
+        self.outliner = Outliner(self.desk, reload=lambda mesh_id, ask: self.files.reload_mesh(None, mesh_id, ask))
         made: tuple[tuple[str, QWidget], ...] = (
             ("scene", Section(PANELS["scene"][0], self.outliner, memory, "scene")),
             ("tool", ToolPanel(self.desk, memory)),

@@ -105,11 +105,11 @@ class Outliner(QTreeView):
     """The tree of the scene."""
 
     def __init__(
-        self, desk: Desk, parent: QWidget | None = None, reload: Callable[[int], object] | None = None,
+        self, desk: Desk, parent: QWidget | None = None, reload: Callable[[int, bool], object] | None = None,
     ) -> None:
         super().__init__(parent)
         self._desk = desk
-        self.reload = reload  # asks for an updated file of a mesh
+        self.reload = reload  # reads the updated file of a mesh, asking for it or not
         self._folded: set[int] = set()
         self._following = False
         self.scene = SceneModel(desk)
@@ -367,10 +367,14 @@ class Outliner(QTreeView):
             lambda: self.toggle_isolated(mesh), view.isolated == (mesh.id,))
         add(menu, "Ghost", "ghost", "Shows the mesh translucent, so that you see what lies behind.",
             lambda: self.toggle_ghosted(mesh), mesh.id in view.ghosted)
-        if whole and self.reload is not None:
-            ask = self.reload
-            add(menu, "Reload…", "reload", "Reads an updated file in its place; the hair comes along.",
-                lambda: ask(item.id))
+        if isinstance(item, MeshObject) and self.reload is not None:
+            read: Callable[[int, bool], object] = self.reload
+            number: int = item.id
+            if item.source:
+                add(menu, "Reload", "reload", f"Reads {item.source} again; the hair comes along.",
+                    lambda: read(number, False))
+            add(menu, "Reload from…" if item.source else "Reload…", "reload",
+                "Reads an updated file in its place; the hair comes along.", lambda: read(number, True))
         menu.addSeparator()
         more = menu.addMenu(icon("plus"), "Add groom")
         more.setToolTipsVisible(True)

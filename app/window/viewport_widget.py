@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QCursor,
@@ -47,14 +47,14 @@ from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_p
 from app.window.theme import look_of, text_font
 from core.document import Document
 from core.errors import UserError
-from core.gate import seen_through
+from core.gate import gate_box, seen_through
 from core.overlay import Overlays
 from core.workspace import Workspace
 from tools.tool import Pointer, Sight
 from viewport.gate import gate_marks
 from viewport.hud import Byte3
 from viewport.panes import corner_of, pane_at, size_of
-from viewport.view import HudLine
+from viewport.view import TEXT_PIXELS, HudLine
 
 if TYPE_CHECKING:
     from app.window.live_picture import LivePicture
@@ -189,6 +189,16 @@ class Viewport(QOpenGLWindow):
             self._lent -= 1
             self.redraw()
 
+    def gate_rect(self) -> QRect:
+        """What the film gate takes of the view in device pixels; all of it where none is shown."""
+        (width, height), view = self.pixels(), self.desk.workspace.view
+        shown = view.gate if view.gate_shown and not self.plate.shown else None
+        box = None if shown is None else gate_box(shown, self.eye.camera, width, height)
+        if box is None:
+            return QRect(0, 0, width, height)
+        left, top, right, bottom = (round(edge + 0.5) for edge in box)
+        return QRect(left, top, right - left, bottom - top).intersected(QRect(0, 0, width, height))
+
     def scale_density(self, factor: float) -> None:
         """Draw so many times as many hairs while the hand moves."""
         if self.picture is not None:
@@ -245,8 +255,8 @@ class Viewport(QOpenGLWindow):
         self._moved = False
         if self.plate.shown:
             self._stale = False
-            ratio = self.devicePixelRatio()
-            self.plate.paint(picture.view, self._screen, self._whole(), self._overlays(), self._pointer, ratio)
+            self.plate.paint(
+                picture.view, self._screen, self._whole(), self._overlays(), self._pointer, self._mark_ratio())
             return
         if drawing:
             self._stale = False
@@ -256,7 +266,11 @@ class Viewport(QOpenGLWindow):
                 picture.draw()
                 self._moved = True
         picture.present(
-            self._screen, self._whole(), self._overlays(), self._hud_lines(), self.devicePixelRatio())
+            self._screen, self._whole(), self._overlays(), self._hud_lines(), self._mark_ratio())
+
+    def _mark_ratio(self) -> float:
+        """Device pixels for a pixel of marks and words, which grow with the window's text."""
+        return self.devicePixelRatio() * look_of().text / TEXT_PIXELS
 
     def resizeGL(self, width: int, height: int) -> None:
         """Another size is another picture."""
@@ -311,8 +325,8 @@ class Viewport(QOpenGLWindow):
     def _overlays(self) -> Overlays:
         gestures, pointer = self.gestures, self._pointer
         under: Overlays = () if self.plate.shown else gate_marks(
-            self.desk.workspace.view, self.eye.camera, self.pixels(), self.devicePixelRatio())
-        under += skeleton_of(self.desk, self.eye.camera, self.pixels(), self.devicePixelRatio())
+            self.desk.workspace.view, self.eye.camera, self.pixels(), self._mark_ratio())
+        under += skeleton_of(self.desk, self.eye.camera, self.pixels(), self._mark_ratio())
         if pointer is None or isinstance(gestures.drag, CameraDrag):
             return under + gestures.overlays()
         if isinstance(gestures.drag, BrushDrag):

@@ -37,13 +37,13 @@ def test_no_file_was_left_out_and_the_names_are_these():
     assert REGISTRY.troubles == []
     assert GROOM == [
         "plant", "scatter", "clone", "comb", "smooth", "length", "cut", "hairspray", "wash", "select", "lasso",
-        "islands", "freeze", "delete", "measure",
+        "islands", "freeze", "paint_map", "delete", "measure",
     ]  # fmt: skip
     assert POSE == [
         "rotate", "move", "ik", "grab", "draw", "inflate", "sculpt_smooth", "relax", "pinch", "flatten", "restore",
         "mask", "weights",
     ]  # fmt: skip
-    assert MATCH == ["track_point", "track_box", "track_plane", "roto", "nudge", "ruler"]
+    assert MATCH == ["track_point", "track_box", "track_plane", "roto", "nudge", "ruler", "track_pattern"]
     assert [*GROOM, *POSE, *MATCH] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)
 
@@ -86,7 +86,7 @@ def check_params(params, hidden=frozenset()):
             if known.choices:
                 with pytest.raises(msgspec.ValidationError):
                     msgspec.convert({name: "no such thing"}, params)
-        elif not isinstance(value, bool):
+        elif value is not None and not isinstance(value, bool):  # None: no map is named
             low, high = known.hard
             assert low <= known.soft[0] < known.soft[1] <= high
             assert low <= value <= high
@@ -129,7 +129,7 @@ def test_the_eraser_does_the_opposite():
         "plant": ("delete", {}), "scatter": ("delete", {}), "comb": ("smooth", {}),
         "length": ("length", {"how": "shrink"}), "hairspray": ("wash", {}), "select": ("select", {"mode": "remove"}),
         "lasso": ("lasso", {"mode": "remove"}), "islands": ("islands", {"mode": "remove"}),
-        "freeze": ("freeze", {"how": "thaw"}),
+        "freeze": ("freeze", {"how": "thaw"}), "paint_map": ("paint_map", {"how": "reverse"}),
     }  # fmt: skip
 
 

@@ -147,6 +147,9 @@ def test_hair_and_maps_are_kept_on_a_finer_mesh(tmp_path):
     write_mesh(tmp_path / "fine.obj", fine)
     after = edits.reload_mesh(start, 1, tmp_path / "fine.obj", unit="m", up="y")
     mesh, groom = after.meshes[0].mesh, after.grooms[0]
+    assert edits.reload_mesh(after, 1).meshes[0].source == str(tmp_path / "fine.obj"), "it knows its file"
+    with pytest.raises(UserError, match="name the file"):
+        edits.reload_mesh(edits.set_mesh_source(after, 1, ""), 1)
     assert len(mesh.points) == len(fine.points)
     assert after.meshes[0].rig is None
     assert np.array_equal(groom.guides.points[:, 0], root_positions(mesh, groom.guides.roots))

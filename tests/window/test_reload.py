@@ -8,6 +8,7 @@ import numpy as np
 from PySide6.QtWidgets import QFileDialog, QMenu
 
 from core.formats.mesh_file import write_mesh
+from core.formats.project import read_project
 from core.mesh.mesh import Mesh
 from core.mesh.surface import root_positions
 from core.record import freeze
@@ -62,13 +63,29 @@ def test_guides_whose_skin_is_gone_are_said_and_selected(opened: Opened, tmp_pat
     assert "selected" in words
 
 
-def test_the_dialog_proposes_the_file_the_mesh_came_from(opened: Opened, tmp_path: Path) -> None:
+def test_a_mesh_knows_its_file_and_asks_only_when_that_is_gone(opened: Opened, tmp_path: Path) -> None:
     hand = opened()
-    write_mesh(tmp_path / "sheet.obj", grid_mesh(4))
-    hand.window.opening.open(tmp_path / "sheet.obj")
-    hand.until(lambda: bool(hand.window.desk.document.meshes))
-    hand.rest()
+    desk, path = hand.window.desk, tmp_path / "sheet.obj"
+    sheet = grid_mesh(4)
+    write_mesh(path, sheet)
+    hand.window.opening.open(path)
+    hand.until(lambda: not desk.jobs.running)
+    desk.session.save(tmp_path / "kept.filo")
+    assert read_project(tmp_path / "kept.filo").document.meshes[0].source == str(path)
+    write_mesh(path, sheet.replace(points=freeze(sheet.points * 3.0)))
     hand.window.commands.run("file.reload_mesh")
+    hand.until(lambda: not desk.jobs.running)
+    np.testing.assert_allclose(desk.document.meshes[0].mesh.points, 3.0 * sheet.points)
+    assert not [d for d in hand.window.findChildren(QFileDialog) if d.isVisible()]
+    hand.window.files.reload_mesh(ask=True)
     dialog = next(d for d in hand.window.findChildren(QFileDialog) if d.isVisible())
     assert [Path(name).name for name in dialog.selectedFiles()] == ["sheet.obj"]
     dialog.close()
+    path.rename(tmp_path / "moved.obj")
+    hand.window.commands.run("file.reload_mesh")
+    dialog = next(d for d in hand.window.findChildren(QFileDialog) if d.isVisible())
+    assert "no longer there" in hand.window.status.words.text()
+    dialog.fileSelected.emit(str(tmp_path / "moved.obj"))
+    dialog.close()
+    hand.until(lambda: not desk.jobs.running)
+    assert desk.document.meshes[0].source == str(tmp_path / "moved.obj")

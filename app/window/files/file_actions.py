@@ -24,7 +24,7 @@ from core.formats.project import write_project
 from core.gate import gate_of
 from core.navigate import whole_in
 from core.workspace import Reference
-from tools.document_edits import Replaced, replaced_mesh
+from tools.document_edits import Replaced, replaced_mesh, set_mesh_source
 from tools.macro import play
 from tools.scene import active_mesh
 
@@ -85,19 +85,30 @@ class FileActions:
             return
         import_sculpt(self._desk, path)
 
-    def reload_mesh(self, path: Path | None = None, mesh_id: int | None = None) -> None:
-        """Put another shape in place of a mesh, the active one unless it is named; its hair comes along."""
+    def reload_mesh(self, path: Path | None = None, mesh_id: int | None = None, ask: bool = False) -> None:
+        """Put the updated shape in place of a mesh, the active one unless it is named; its hair comes along.
+
+        path : of the file; None for the one the mesh was read from, which is asked for when it is not there (or in
+        any case, with `ask`).
+        """
         document = self._desk.session.history.current
         active = active_mesh(document, self._desk.workspace)
         item = active if mesh_id is None else find_mesh(document, mesh_id)
         if item is None:
             raise UserError("There is no mesh yet: open or import one first.")
         if path is None:
-            start = self._window.opening.source(item.name)
-            self._choose(
-                f"The new shape of {item.name}", [filter_of("Meshes", MESH_SUFFIXES)],
-                lambda name: self.reload_mesh(name, item.id), start=start)
-            return
+            known = Path(item.source) if item.source else None
+            there = known is not None and known.is_file()
+            if not there or ask:
+                if known is not None and not there:
+                    self._desk.said.emit(f"{known} is no longer there; choose where {item.name} is now.")
+                near = known is not None and known.parent.is_dir()
+                self._choose(
+                    f"The new shape of {item.name}", [filter_of("Meshes", MESH_SUFFIXES)],
+                    lambda name: self.reload_mesh(name, item.id), start=known if near else None)
+                return
+            path = known
+        assert path is not None
 
         def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> tuple[MeshFile, Replaced]:
             found = read_mesh(path, cancel=cancelled)
@@ -110,7 +121,7 @@ class FileActions:
             def put(now: Document) -> Document:
                 # the hair may have been combed meanwhile: what was made beside the window is then made anew
                 made = replaced if now is document else replaced_mesh(now, item.id, found.mesh)
-                return made.with_selection()
+                return set_mesh_source(made.with_selection(), item.id, str(path.absolute()))
 
             if self._desk.edit("Reload mesh", put):
                 self._desk.said.emit(" ".join((reloaded(path.name, replaced), *found.notes)))
@@ -143,10 +154,10 @@ class FileActions:
             f"Write {path.name}", write, lambda _: self._desk.said.emit(f"The coat is in {path}."))
 
     def save_screenshot(self, path: Path | None = None) -> None:
-        """What the viewport shows, as a PNG."""
+        """What the viewport shows, or of it what a film gate takes, as a PNG."""
         if path is None:
             self._choose("Save a picture", ["Picture (*.png)"], self.save_screenshot, ".png")
-        elif view_image(self._window.viewport).save(str(path)):
+        elif view_image(self._window.viewport).copy(self._window.viewport.gate_rect()).save(str(path)):
             self._desk.said.emit(f"The picture is in {path}.")
         else:
             raise UserError(f"{path} could not be written; choose another folder.")

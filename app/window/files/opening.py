@@ -66,7 +66,6 @@ class Opening(QObject):
         super().__init__(desk)
         self._desk, self._parent, self._make, self._remember = desk, parent, make, remember
         self._open_plate = open_plate
-        self._sources: dict[str, Path] = {}  # where meshes of this run came from, by name
 
     # -- asking ----------------------------------------------------------------------------------------------
 
@@ -77,11 +76,6 @@ class Opening(QObject):
     def ask_import(self) -> None:
         """Let the artist choose a mesh to add."""
         choose_file(self._parent, "Import a mesh", [filter_of("Meshes", MESH_SUFFIXES)], self.import_mesh)
-
-    def source(self, mesh: str) -> Path | None:
-        """The file a mesh of this name was read from, when that was in this run and it is still there."""
-        path = self._sources.get(mesh)
-        return path if path is not None and path.is_file() else None
 
     # -- opening ---------------------------------------------------------------------------------------------
 
@@ -152,8 +146,6 @@ class Opening(QObject):
     def _read_mesh(self, path: Path, then: Callable[[Path, MeshFile], None]) -> None:
         def done(found: MeshFile) -> None:
             then(path, found)
-            if self._desk.document.meshes:
-                self._sources[self._desk.document.meshes[-1].name] = path
             self._remember(path)
             if found.notes:
                 self._desk.said.emit(" ".join(found.notes))
@@ -206,12 +198,12 @@ class Opening(QObject):
         self._desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: read_rig(path, cancel=cancelled), done)
 
     def _open_mesh(self, path: Path, found: MeshFile) -> None:
-        document = with_mesh_to_plant(Document(), found.mesh, found.name)
+        document = with_mesh_to_plant(Document(), found.mesh, found.name, str(path.absolute()))
         self._desk.replace_session(self._make(document, name=f"Open {path.name}"[:255]))
         self._desk.set_workspace(frame=float(document.first_frame))
 
     def _import_mesh(self, path: Path, found: MeshFile) -> None:
-        if self._desk.edit("Import mesh", with_mesh_to_plant, found.mesh, found.name):
+        if self._desk.edit("Import mesh", with_mesh_to_plant, found.mesh, found.name, str(path.absolute())):
             document = self._desk.document
             added = document.meshes[-1].id
             self._desk.set_workspace(groom=next(g.id for g in document.grooms if g.mesh_id == added))
@@ -264,9 +256,9 @@ class Opening(QObject):
             self._desk.set_workspace(view=view.replace(references=tuple(pinned)))
 
 
-def with_mesh_to_plant(document: Document, mesh: Mesh, name: str) -> Document:
-    """The document with a mesh and an empty groom on it, so that a hand can plant at once."""
-    added = add_mesh(document, mesh, name)
+def with_mesh_to_plant(document: Document, mesh: Mesh, name: str, source: str = "") -> Document:
+    """The document with a mesh (of a file) and an empty groom on it, so that a hand can plant at once."""
+    added = add_mesh(document, mesh, name, source)
     return add_empty_groom(added, added.meshes[-1].id, "coat")
 
 
