@@ -83,7 +83,10 @@ def enqueue(net, h):  # type: ignore[no-untyped-def]
         net.tally[WAITING] += 1
 
 
-@njit(types.void(NET, types.int64, types.int64, types.float64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy")
+@njit(
+    types.void(NET, types.int64, types.int64, types.float64, types.float64, types.float64),
+    cache=True, nogil=True, error_model="numpy",
+)
 def put_point(net, p, f, b0, b1, b2):  # type: ignore[no-untyped-def]
     """Hang point `p` into face `f`, weights clamped to the triangle."""
     b0 = max(b0, 0.0)
@@ -253,7 +256,8 @@ def _move_edge(net, old, new):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.boolean(NET, types.int64, types.int64, types.float64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy"
+    types.boolean(NET, types.int64, types.int64, types.float64, types.float64, types.float64),
+    cache=True, nogil=True, error_model="numpy",
 )
 def insert_vertex(net, v, f, w0, w1, w2):  # type: ignore[no-untyped-def]
     """Put vertex `v` into face `f` at weights w, then restore Delaunay; False when no face is left for it."""

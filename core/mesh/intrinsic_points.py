@@ -121,7 +121,10 @@ def _name_corners(net, kind, label, f, name, place):  # type: ignore[no-untyped-
     return helper
 
 
-@njit(types.void(NET, types.int64, types.int64, I1, I1, types.boolean, _I2, _S2, B1), cache=True, nogil=True, error_model="numpy")
+@njit(
+    types.void(NET, types.int64, types.int64, I1, I1, types.boolean, _I2, _S2, B1),
+    cache=True, nogil=True, error_model="numpy",
+)
 def _read_point(net, p, row, name, place, helper, sites, weights, trouble):  # type: ignore[no-untyped-def]
     """Write the binding of point `p` to `row`. `trouble`: 1 bound through a helper, 2 to nothing."""
     w0, w1, w2 = 0.0, 0.0, 0.0
@@ -161,7 +164,10 @@ def sort_points(home, count, ends, points):  # type: ignore[no-untyped-def]
         ends[f + 1] += 1
 
 
-@njit(types.void(NET, B1, I1, _RI1, I1, I1, types.int64, types.int64, I1, _I2, _S2, B1), cache=True, nogil=True, error_model="numpy")
+@njit(
+    types.void(NET, B1, I1, _RI1, I1, I1, types.int64, types.int64, I1, _I2, _S2, B1),
+    cache=True, nogil=True, error_model="numpy",
+)
 def read_faces(net, kind, label, given, ends, points, start, stop, order, sites, weights, trouble):  # type: ignore[no-untyped-def]
     """Write the binding of points of the faces start .. stop to the rows they were given in, and their rows to
     `order`, sorted by face. One face more than there are is that of points that have none."""

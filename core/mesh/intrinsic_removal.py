@@ -88,7 +88,10 @@ def _ease(net, ring, d):  # type: ignore[no-untyped-def]
     return flip(net, ring.spoke[skew] if ring.inner[skew] > ring.inner[j] else ring.spoke[j])
 
 
-@njit(types.void(NET, RING, types.int64, types.int64, types.float64, types.float64), cache=True, nogil=True, error_model="numpy")
+@njit(
+    types.void(NET, RING, types.int64, types.int64, types.float64, types.float64),
+    cache=True, nogil=True, error_model="numpy",
+)
 def _relocate(net, ring, p, d, x, y):  # type: ignore[no-untyped-def]
     """Hang point `p` at position (x, y) of the layout into the new triangle it lies in (new faces use old spokes')."""
     best, w0, w1 = -1, 0.0, 0.0
@@ -183,7 +186,8 @@ def _rewire(net, ring, d):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.boolean(NET, RING, types.int64, types.int64, types.int64, types.boolean), cache=True, nogil=True, error_model="numpy"
+    types.boolean(NET, RING, types.int64, types.int64, types.int64, types.boolean),
+    cache=True, nogil=True, error_model="numpy",
 )
 def remove_vertex(net, ring, v, point, cap, forgiving):  # type: ignore[no-untyped-def]
     """Take vertex `v` out, restore Delaunay, and hang `point` (-1: none) where it was; False when it must wait.

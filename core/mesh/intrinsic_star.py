@@ -137,7 +137,10 @@ def place_unflattened(ring, d):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(types.float64(RING, types.int64, types.int64, types.int64, types.float64), cache=True, nogil=True, error_model="numpy")
+@njit(
+    types.float64(RING, types.int64, types.int64, types.int64, types.float64),
+    cache=True, nogil=True, error_model="numpy",
+)
 def _lift(ring, i, j, k, sliver):  # type: ignore[no-untyped-def]
     """Height over the vertex of the plane of ear i, j, k on the paraboloid; infinite where thinner than `sliver`."""
     ax, ay, bx, by, cx, cy = ring.x[i], ring.y[i], ring.x[j], ring.y[j], ring.x[k], ring.y[k]
