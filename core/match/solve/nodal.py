@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.match.solve.bundle import TURN, Adjusted, Free, adjust
+from core.match.solve.bundle import POSE, TURN, Adjusted, Free, adjust
 from core.match.solve.state import FRAME_FOCAL, Array, Observations, State, bearings
 
 ROUNDS = 8  # of reweighting
 FEWEST = 3  # tracks two frames must share
+MOST = 32  # frames on which it is tried whether the camera moves
+BY_CHANCE = 12.0
 DISTANCE = 1e-6  # damping: how far a point is cannot be told
 
 
@@ -60,3 +62,27 @@ def solve_nodal(
         state, observations, Free(frame=frame, lens=lens_columns, zoom=zoom), scale=scale, least_damping=DISTANCE,
         iterations=12, tolerance=1e-3,
     )
+
+
+def parallax(state: State, observations: Observations, sigma: float) -> float:
+    """Whether a camera that was solved as one that only turns moves after all.
+
+    By how much the squares fall when it may, beyond what the added parameters take up by chance, in standard deviations
+    of that; up to `BY_CHANCE` where it does not move (measured: noise has a shape that is best for it).
+
+    observations : those that were used. sigma : of the whitened residuals.
+    """
+    frames = np.unique(observations.frame)
+    kept = frames[np.unique(np.linspace(0, len(frames) - 1, min(MOST, len(frames))).astype(int))]
+    number = np.full(len(state.rotation), -1, np.int32)
+    number[kept] = np.arange(len(kept))
+    part = observations.take(number[observations.frame] >= 0)
+    part = part._replace(frame=number[part.frame])
+    begin = State(
+        np.ascontiguousarray(state.rotation[kept]), state.translation[kept], state.points, state.focal[kept], state.lens
+    )
+    turning = adjust(begin, part, Free(frame=TURN), iterations=10, tolerance=1e-6, least_damping=DISTANCE)
+    moving = adjust(turning.state, part, Free(frame=POSE), iterations=60, tolerance=1e-5, least_damping=DISTANCE)
+    added = 3 * len(kept) + len(np.unique(part.track))
+    fallen = (turning.cost - moving.cost) / max(sigma, 1e-12) ** 2
+    return float((fallen - added) / np.sqrt(2.0 * added))

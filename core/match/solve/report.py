@@ -12,6 +12,8 @@ import numpy as np
 
 from core.errors import UserError
 from core.match.solve.bundle import Free, Reduced, normal_equations, reduced
+from core.match.solve.nodal import BY_CHANCE, parallax
+from core.match.solve.slides import correlation
 from core.match.solve.solve import Solution
 from core.match.solve.state import (
     ASPECT,
@@ -37,6 +39,9 @@ PATH, NO_PATH = 0.03, 0.3  # uncertainty of the path over its size
 OUT, TOO_MANY_OUT = 0.4, 0.49  # share of the tracks that do not fit
 APART, MOVES = 1.5, 2.0  # of the typical error; of the doubt of the path: worth a look
 FLAT = 4.0  # standard deviations of the points: a plane as well as can be told
+
+
+TRANSLATION = "translation"
 
 
 class Test(NamedTuple):
@@ -66,7 +71,8 @@ class Report(NamedTuple):
     by_frame (F,), by_track (P,) : RMS in pixels, NaN where nothing was used.
     focal_px : (F,). focal_sigma_px : of the shared focal length, 0 where it was given.
     path_sigma : uncertainty of the path over its size; 0 of a camera that only turns.
-    point_sigma : (P, 3, 3) covariance of points in world, NaN where there is none.
+    point_sigma : (P, 3, 3) covariance of points in world, NaN where there is none; centre_sigma : (F, 3, 3) of where
+        cameras stand. Both as seen from the points as a whole: what moves, turns or scales all of them is no error.
     kind : "free", "planar" or "nodal". tests : of what was held fixed. warnings, advice : for the artist.
     fixes : what leaving out the worst tracks and frames would do, the most helpful first.
     """
@@ -82,6 +88,7 @@ class Report(NamedTuple):
     focal_sigma_px: float
     path_sigma: float
     point_sigma: Array
+    centre_sigma: Array
     kind: str
     tests: tuple[Test, ...]
     warnings: tuple[str, ...]
@@ -128,6 +135,9 @@ def report(solution: Solution, names: list[str]) -> Report:
             "points. Solve it as one that only turns (--nodal), or add tracks that are near."
         )
     tests = certain.tests()
+    if kind == "nodal":
+        gain = parallax(state, part, solution.sigma)
+        tests = (*tests, Test(TRANSLATION, gain if gain > BY_CHANCE else 0.0, 0.0))
     sigma_f = certain.focal_sigma() * float(np.exp(state.lens[FOCAL]))
     warnings = [*solution.said, *_warnings(solution, noisy, out, path, sigma_f, tests)]
     rms = float(np.sqrt((length**2).mean()))
@@ -135,7 +145,8 @@ def report(solution: Solution, names: list[str]) -> Report:
     return Report(
         rms, float(np.median(length)), float(length.mean()),
         float(np.quantile(length, 0.95)), float(length.max()), by_frame, by_track, focal, sigma_f, path,
-        certain.points, kind, tests, tuple(warnings), _advice(solution, names, rms, by_frame, by_track, fixes), fixes,
+        certain.points, certain.centres(), kind, tests, tuple(warnings),
+        _advice(solution, names, rms, by_frame, by_track, fixes), fixes,
     )
 
 
@@ -174,6 +185,9 @@ class _Certainty:
             rotation=np.ascontiguousarray(state.rotation[self._known]), translation=state.translation[self._known],
             points=state.points[self._held], focal=state.focal[self._known],
         )
+        # what wanders from frame to frame counts as fewer observations (of an autoregressive noise)
+        wander = min(max(correlation(self._state, part), 0.0), 0.95)
+        self._slow = (1.0 + wander) / (1.0 - wander)
         self._poses = tuple(c for c in solution.free.frame if c != FRAME_FOCAL)
         columns = (*self._poses, FRAME_FOCAL)
         self._nodal = len(self._poses) == 3
@@ -318,6 +332,24 @@ class _Certainty:
             share = self._moved_path(whole, rest) / max(size * path, 1e-12)
         return Fix(kind, row, rms * float(np.sqrt(left)), share)
 
+    def centres(self) -> Array:
+        """(F, 3, 3) covariance of where the cameras stand, NaN where there is none."""
+        found = np.full((len(self._solution.known), 3, 3), np.nan)
+        if self._root is None or self._whole is None or self._nodal:
+            return found
+        whole: Reduced = self._whole
+        count, width = whole.right_out.shape
+        across = whole.across.reshape(count, width, -1)[:, :, self._rows] @ self._root.T
+        inner = np.eye(width) + np.einsum("fik,fjk->fij", across, across)
+        pose = np.einsum("fki,fkl,flj->fij", whole.roots, inner, whole.roots) * self._solution.sigma**2
+        # of a turn and a shift of a pose: -R^T (shift + t x turn), and t x turn is a product with a skew matrix
+        t = self._state.translation
+        skew = np.cross(t[:, None, :], np.eye(3)).transpose(0, 2, 1)
+        way = np.concatenate([skew, np.tile(np.eye(3), (count, 1, 1))], axis=2)
+        way = -np.einsum("fji,fjk->fik", self._state.rotation, way)
+        found[self._known] = np.einsum("fik,fkl,fjl->fij", way, pose, way)
+        return found
+
     def tests(self) -> tuple[Test, ...]:
         """Score tests of the parameters of the lens that were held, and of a zoom at an even pace."""
         if self._root is None or self._whole is None:
@@ -352,7 +384,7 @@ class _Certainty:
         better = value + slope / left
         if name in ("focal length", "pixel aspect", "zoom"):
             better = float(np.exp(min(max(better, -30.0), 30.0)))
-        return Test(name, slope**2 / left / self._solution.sigma**2, better)
+        return Test(name, slope**2 / left / self._solution.sigma**2 / self._slow, better)
 
 
 def _worst(error: Array, most: int = 6) -> Rows:
@@ -392,6 +424,11 @@ def _warnings(
         said.append(f"The path is known to {100 * path:.1f} % of its size only; tracks that are nearer would help.")
     if sigma_f > FOCAL_SIGMA * focal:
         said.append(f"The focal length is known to {100 * sigma_f / focal:.1f} % only; give it if you know it.")
+    if any(test.name == TRANSLATION and test.gain for test in tests):
+        said.append(
+            "The camera moves a little, as the parallax of the tracks shows: solved as one that only turns, its "
+            "rotations are off by that. Add tracks that are near, so that the path can be told.")
+        tests = ()  # what the lens seems to do is what that movement does
     strong = [test for test in tests if test.gain > GAIN]
     for test in sorted(strong, key=lambda one: -one.gain)[:2]:
         value = {

@@ -62,7 +62,7 @@ def shot_of(solution: Solution, names: list[str]) -> Shot:
     known = np.flatnonzero(solution.known & (solution.views.camera == 0))
     held = np.flatnonzero(solution.held)
     state = solution.state
-    focal = np.exp(state.lens[FOCAL] + state.focal[known])
+    focal = np.exp(state.lens[FOCAL] + state.focal[known]) * solution.pixel[known]
     lens = state.lens.copy()
     lens[FOCAL] = np.log(focal[0]) if len(known) else lens[FOCAL]
     return Shot(

@@ -15,6 +15,7 @@ from core.match.solve.bundle import POSE, TURN, Free, adjust
 from core.match.solve.first import Cameras, Grower, best_pairs, keyframes, rays, triangulated
 from core.match.solve.floor import noise_floor
 from core.match.solve.nodal import solve_nodal
+from core.match.solve.slides import correlation, sliding
 from core.match.solve.state import (
     FOCAL,
     FRAME_FOCAL,
@@ -42,6 +43,10 @@ OUTLIER = 4.5  # standard deviations
 PICKED = 1.0 / 2000.0  # of the width of a photograph: noise of what was seen in photographs alone
 WILD = 0.005  # of the width of the picture: noise no tracker makes
 HYPOTHESES = 6
+RAMPS = (0.3, -0.3, 0.7, -0.7)  # of the logarithm of the focal length from the first frame to the last
+RAMPED = 0.9  # of the residuals: such a zoom explains more
+LEFT_OUT, WANDERS = 0.1, 0.1  # share of the tracks that do not fit, and correlation of what the others miss by
+ROUNDS_OUT = 5  # of leaving out what does not fit; two, and more while slow slides are found
 ROUNDS, REFOCUSED = 2, 0.002  # of a camera whose distortion was taken out at a focal length that moved by this part
 
 
@@ -179,7 +184,33 @@ def _best(
         if best is None or start.doubt < best[0].doubt:
             best = start, problem
     assert best is not None
-    return best[1].finish(best[0])
+    start, problem = best
+    found = problem.finish(start)
+    missing = _left_out(found) > LEFT_OUT and correlation(found.state, found.observations.take(found.used)) > WANDERS
+    doubtful = start.doubt > ACCEPT or missing
+    if start.kind == "nodal" or not doubtful or views.alone.any() or len(views.cameras) > 1:
+        return found
+    # a dolly zoom lies far from any path at one focal length: begin at zooms of an even pace
+    likely: tuple[_Start, _Problem] | None = None
+    for ramp in RAMPS:
+        other = _Problem(
+            observations, frames, tracks, size, options._replace(zoom=True), views, problem.focal, progress, ramp)
+        began = other.begin()
+        if began.doubt < np.inf and (likely is None or began.doubt < likely[0].doubt):
+            likely = began, other
+    if likely is None:
+        return found
+    said = "The focal length changes over the shot: it was solved with a zoom, which nobody asked for."
+    zoomed = likely[1].finish(likely[0]._replace(said=() if options.zoom else (said,)))
+    fewer = _left_out(zoomed) < 0.5 * _left_out(found) and zoomed.sigma < 1.05 * found.sigma
+    nearer = _left_out(zoomed) < _left_out(found) + 0.02 and zoomed.sigma < RAMPED * found.sigma
+    return zoomed if fewer or nearer else found
+
+
+def _left_out(found: Solution) -> float:
+    """Share of the tracks that do not fit."""
+    seen = np.bincount(found.observations.track, minlength=len(found.held)) >= 2
+    return 1.0 - float(found.held[seen].mean()) if seen.any() else 1.0
 
 
 def _noise(observations: Observations, views: Views, size: tuple[int, int]) -> tuple[float, bool]:
@@ -227,9 +258,11 @@ class _Start(NamedTuple):
 class _Problem:
     def __init__(
         self, observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
-        views: Views, focal: float, progress: Callable[[str], None],
+        views: Views, focal: float, progress: Callable[[str], None], ramp: float = 0.0,
     ) -> None:
-        self.observations, self.pixel = as_one(observations, views, focal)
+        pace = np.exp(ramp * (frames - frames[0]) / max(1, int(frames[-1] - frames[0])))
+        self.observations, self.pixel = as_one(observations, views, focal, pace)
+        self.focal = focal
         self.frames, self.tracks, self.size, self.views = frames, tracks, size, views
         self.pixels, told = _noise(self.observations, views, size)
         self.noise = self.pixels * float(np.median(self.observations.root[:, 0]))
@@ -387,13 +420,21 @@ class _Problem:
         state = adjust(
             state, observations.take(used), free, scale=2.5 * spread, tolerance=1e-4, least_damping=least, iterations=20
         ).state
-        for _ in range(2):
+        sliders = np.zeros(self.tracks, bool)
+        for k in range(ROUNDS_OUT):
             spread = max(self.least, self._spread(state, observations, used))
+            more = np.zeros(self.tracks, bool)
+            if not self.views.alone.any():
+                told = self._spread(state, observations, used)
+                more = sliding(state, observations.take(used), self.tracks, told) & held
+            if k >= 2 and not more.any():
+                break
+            sliders |= more
             error = np.linalg.norm(residuals(state, observations), axis=1) / spread
             dof = np.maximum(2.0 * np.bincount(observations.track[used], minlength=self.tracks) - 3.0, 1.0)
             chi = np.bincount(
                 observations.track[used], weights=np.minimum(error[used], 50.0) ** 2, minlength=self.tracks) / dof
-            held = held & (chi < 1.5 + 5.0 * np.sqrt(2.0 / dof))
+            held = held & (chi < 1.5 + 5.0 * np.sqrt(2.0 / dof)) & ~sliders
             used = known[observations.frame] & held[observations.track] & (error < OUTLIER)
             seen = np.bincount(observations.track[used], minlength=self.tracks)
             held = held & (seen >= 2)

@@ -63,9 +63,14 @@ def guessed(camera: Camera) -> float:
     return camera.focal or FROM_WIDTH * max(camera.size)
 
 
-def as_one(observations: Observations, views: Views, focal: float) -> tuple[Observations, Array]:
+def as_one(
+    observations: Observations, views: Views, focal: float, pace: Array | None = None
+) -> tuple[Observations, Array]:
     """Observations as the first camera would have them at `focal` pixels, and how many pixels of its own picture one of
-    those is in each frame, (F,)."""
+    those is in each frame, (F,).
+
+    pace : (F,) over its focal length that of each frame, where it is thought to zoom.
+    """
     main = views.cameras[0]
     pixel = np.ones(len(views.camera))
     xy, root = observations.xy.copy(), observations.root.copy()
@@ -81,6 +86,9 @@ def as_one(observations: Observations, views: Views, focal: float) -> tuple[Obse
             xy[rows] = bearings(lens, 0.0, xy[rows])[:, :2] * focal + middle
         root[rows] *= own / focal
         pixel[views.camera == row] = own / focal
+    if pace is not None:
+        share = pace[observations.frame, None]
+        xy, root, pixel = middle + (xy - middle) / share, root * share, pixel * pace
     return observations._replace(xy=np.ascontiguousarray(xy), root=np.ascontiguousarray(root)), pixel
 
 
