@@ -181,3 +181,27 @@ def test_edits_of_selected_tracks():
         edits.join(document, (1,))
     with pytest.raises(UserError, match="No track"):
         edits.smooth(document, ())
+
+
+def test_the_pattern_of_a_track_is_shaped_moved_aside_and_drawn():
+    session = begun(*two())
+    with pytest.raises(UserError, match="No track is selected"):
+        drag(session, "track_pattern", [[140.0, 100.0], [150.0, 100.0]])
+    session.edit("Select", edits.select_tracks, (1,))
+    corner = np.array([140.0, 100.0]) + 10.5 * np.array([1.0, -1.0])
+    (track, _) = drag(session, "track_pattern", [corner, corner + np.array([6.0, -4.0])]).tracks
+    assert np.allclose(track.shape, [[-10.5, -10.5], [16.5, -14.5], [10.5, 10.5], [-10.5, 10.5]])
+    assert track.settings.pattern >= 33
+    (track, _) = drag(session, "track_pattern", [[140.0, 100.0], [152.0, 103.0]]).tracks
+    assert track.offset == pytest.approx((12.0, 3.0))
+    assert np.allclose(track.points[0], [140.0, 100.0]), "the point itself stays"
+    angles = np.linspace(0.0, 2.0 * np.pi, 40)
+    ring = np.array([205.0, 60.0]) + 12.0 * np.column_stack([np.cos(angles), np.sin(angles)])
+    (track, _) = drag(session, "track_pattern", ring).tracks
+    assert track.shape_smooth
+    assert track.offset == pytest.approx((65.0, -40.0), abs=1.0)
+    assert np.hypot(*track.shape.T) == pytest.approx(np.full(len(track.shape), 12.0), abs=1.5)
+    assert session.history.names[-3:] == ("Track pattern",) * 3
+    session.set_workspace(frame=1007.0)
+    with pytest.raises(UserError, match="no key here"):
+        drag(session, "track_pattern", [[140.0, 100.0], [150.0, 100.0]])

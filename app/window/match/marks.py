@@ -85,7 +85,8 @@ def track_marks(track: Track, sheet: Sheet, selected: bool, tail: int) -> list[O
     if selected:
         settings = track.settings or TrackSettings()
         middle = place + np.asarray(track.offset)
-        outline = track.shape if track.shape is not None else 0.5 * settings.pattern * SQUARE
+        outline = 0.5 * settings.pattern * SQUARE if track.shape is None else \
+            curve_through(track.shape) if track.shape_smooth else track.shape
         search = (0.5 * settings.pattern + settings.search) * SQUARE
         out.append(Polyline(sheet.at(middle + outline), tone, 1.5, closed=True))
         out.append(Polyline(sheet.at(middle + search), "faint", 1.0, closed=True, dashed=True))

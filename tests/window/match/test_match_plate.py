@@ -243,3 +243,24 @@ def test_a_click_in_the_list_is_no_step_and_shapes_are_deleted_one_by_one(opened
     QTest.mouseClick(shapes.buttons["lock"], LEFT)
     QTest.mouseClick(shapes.buttons["delete"], LEFT)
     assert [m.id for m in desk.document.masks] == [1]
+
+
+def test_a_point_is_followed_by_a_drawn_pattern_beside_it(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk = hand.window.desk
+    click(hand, START)
+    desk.choose("track_pattern")
+    angles = np.linspace(0.0, 2.0 * np.pi, 24)
+    ring = START + np.array([30.0, 5.0]) + 11.0 * np.column_stack([np.cos(angles), np.sin(angles)])
+    QTest.mousePress(hand.view, LEFT, NONE, pixel(hand, ring[0]))
+    for place in ring[1:]:
+        QTest.mouseMove(hand.view, pixel(hand, place))
+        hand.painted()
+    QTest.mouseRelease(hand.view, LEFT, NONE, pixel(hand, ring[-1]))
+    (track,) = desk.document.tracks
+    assert track.offset == pytest.approx((30.0, 5.0), abs=2.0)
+    hand.window.commands.run("match.forward")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    (track,) = desk.document.tracks
+    assert len(track.frames) == COUNT
+    assert np.abs(track.points - track.points[0] - np.arange(COUNT)[:, None] * STEP).max() < 0.2
