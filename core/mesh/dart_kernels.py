@@ -250,26 +250,35 @@ def put_to_sleep(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.int64(
-        types.int32[::1], types.int64, I32_1D, F32_2D, F32_1D, U16_1D, types.int64, types.float32[:, ::1],
-        types.int32[::1], types.int64[::1]
-    ),
+    types.int64(types.int32[::1], types.int64, F32_1D, U16_1D, types.int64, types.int64[::1]),
     cache=True, nogil=True, error_model="numpy",
 )
-def awake(active, count, triangle, places, stretch, wake, level, points, faces, counts):  # type: ignore[no-untyped-def]
-    """Gather those of the `count` active candidates that were not put to sleep, in order, with place, stretch and face;
-    returns how many. `counts` is how many there are of each octave."""
+def awake(active, count, stretch, wake, level, counts):  # type: ignore[no-untyped-def]
+    """Bring those of the `count` active candidates that were not put to sleep to the front, in order; returns how many.
+    `counts` is how many there are of each octave."""
     counts[:] = 0
     n = 0
     for at in range(count):
         c = np.uintp(active[at])
         if wake[c] == level:
-            active[n], faces[n] = active[at], triangle[c]
-            points[n, 0], points[n, 1], points[n, 2] = places[c, 0], places[c, 1], places[c, 2]
-            points[n, 3] = stretch[c]
+            active[n] = active[at]
             counts[_octave(stretch[c])] += 1
             n += 1
     return n
+
+
+@njit(
+    types.void(
+        I32_1D, types.int64, types.int64, I32_1D, F32_2D, F32_1D, types.float32[:, ::1], types.int32[::1]
+    ),
+    cache=True, nogil=True, error_model="numpy",
+)
+def gather_active(active, start, stop, triangle, places, stretch, points, faces):  # type: ignore[no-untyped-def]
+    """Write place and stretch, and the face, of the active candidates start .. stop."""
+    for s in range(start, stop):
+        c = np.uintp(active[s])
+        points[s, 0], points[s, 1], points[s, 2], points[s, 3] = places[c, 0], places[c, 1], places[c, 2], stretch[c]
+        faces[s] = triangle[c]
 
 
 @njit(

@@ -23,6 +23,7 @@ from core.mesh.dart_kernels import (
     fill_buckets,
     find_buckets,
     find_rivals,
+    gather_active,
     put_to_sleep,
     settle,
     waking,
@@ -186,8 +187,11 @@ class _Darts:
                 )
 
         self._ranges(count, test, GRAIN)
-        total = awake(
-            self.active, count, triangle, places, stretch, self.wake, level, left.points, left.faces, left.counts
+        total = awake(self.active, count, stretch, self.wake, level, left.counts)
+        self._ranges(
+            total,
+            lambda a, b: gather_active(self.active, a, b, triangle, places, stretch, left.points, left.faces),
+            GRAIN,
         )
         new = left.cells(total, CELL_OF_NEW * radius)
         self._ranges(

@@ -121,8 +121,10 @@ class _Ground:
         order, corners = order[finite], corners[finite]
         if not len(order):
             raise UserError("Nothing can be scattered: no face of the mesh has finite coordinates.")
-        low, high = corners.min((0, 1)), corners.max((0, 1))
-        by_place = np.argsort(morton_codes(corners.mean(1), low, high), kind="stable")
+        rows = corners.reshape(-1, 9)  # numpy is slow at minima of three
+        low, high = rows.min(0).reshape(3, 3).min(0), rows.max(0).reshape(3, 3).max(0)
+        middles = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
+        by_place = np.argsort(morton_codes(middles, low, high), kind="stable")
         self.faces = order[by_place].astype(np.int32)
         # relative to the middle, so that float32 places keep their digits far from the origin
         self.corners = np.ascontiguousarray((corners[by_place] - (low + high) / 2).reshape(-1, 9), np.float32)
