@@ -63,7 +63,7 @@ def _solved(made: Shot):
 
 
 def test_a_dolly_zoom_declared_fixed_is_solved_with_a_zoom_and_that_is_said():
-    scene = _scene(40)
+    scene = _scene()
     depth = -3.0 * scene.t
     centres = np.stack([0.6 * scene.t, 0 * scene.t, depth], 1)
     made = _shot(scene._replace(centres=centres, turn=np.tile(np.eye(3), (FRAMES, 1, 1))), np.log(1 - depth / 10))
