@@ -105,7 +105,7 @@ class Moving:
         maps.bind()
         for drawable in drawables:
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0}))
+            _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0, "tap_reach": 0}))
         self.opening = False
         behind = self.base if picture is None else self._patched(scene, camera, picture, uniforms["clip_from_world"])
         self.touched = []
