@@ -175,7 +175,7 @@ class FeatherCoat(Record):
     roll: Annotated[Value, value_field(
         "Roll", "Angle about the shaft by which the back lies over the flanks; neighbours then do not share a plane.",
         "rad", soft=(0.0, 0.3), hard=(-1.5, 1.5),
-    )] = constant(0.07)
+    )] = constant(0.12)
     curl: Annotated[Value, value_field(
         "Curl", "Angle by which the tips curl away from the skin, beyond what the keys do; below 0 they curl in.",
         "rad", soft=(-1.0, 1.0), hard=(-3.0, 3.0),

@@ -21,7 +21,7 @@ from core.mesh.surface import place_roots, root_positions
 from core.record import freeze
 
 KEYS, POINTS = 120, 8
-LIFT = 0.21  # radians, of a key off the skin
+LIFT = 0.28  # radians, of a key off the skin
 
 
 class Dressed(NamedTuple):

@@ -37,7 +37,7 @@ from core.random import rand
 from core.value import Formula, Value, evaluate_within, names_used
 
 ROWS, COLUMNS = 8, 5  # of a vane as it is layered
-STANDING = 0.21  # radians, lift of feathers without keys
+STANDING = 0.28  # radians, lift of feathers without keys
 SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
 BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
 GIVE = np.radians(1.4)  # by which a frame may lift a feather where the skin does not bend
