@@ -13,6 +13,7 @@ from app.window.commands import Commands
 from app.window.desk import Desk
 from app.window.hotkeys import Hotkeys
 from app.window.icons import paint_icon
+from app.window.menus import rows_of
 from app.window.theme import look_of, text_font
 
 LITTLE = 5.0  # seconds between two words about the autosave
@@ -95,9 +96,7 @@ class TopBar(QWidget):
             names = [c.name for c in self._commands if c.name.split(".")[0] == category]
             if names:
                 part = menu.addMenu(f"&{title}")
-                part.setToolTipsVisible(True)
-                for name in names:
-                    part.addAction(self._hotkeys.action(name))
+                self._fill(part, category, names)
                 looked.add(category)
         rest = [c.name for c in self._commands if c.name.split(".")[0] not in looked]
         if rest:
@@ -106,6 +105,19 @@ class TopBar(QWidget):
                 part.addAction(self._hotkeys.action(name))
         self._hotkeys.refresh()
         return menu
+
+    def _fill(self, menu: QMenu, category: str, names: list[str]) -> None:
+        """Put the commands of a category into its menu, in parts."""
+        menu.setToolTipsVisible(True)
+        apart = False
+        for title, part in rows_of(category, names):
+            if menu.actions() and not (title and apart):
+                menu.addSeparator()
+            to = menu.addMenu(title) if title else menu
+            to.setToolTipsVisible(True)
+            for name in part:
+                to.addAction(self._hotkeys.action(name))
+            apart = bool(title)
 
     def open_menu(self) -> None:
         """Open the menus below their button."""
