@@ -57,7 +57,8 @@ class Work:
         made: tuple[Track, ...] = ()
         with self._opened(cancelled) as read:
             for number, (own, tracks) in enumerate(groups.values() if groups else ((settings, []),)):
-                tracking = Tracking(read, frames, tuple(tracks), own, auto=auto, hold=self._held)
+                tracking = Tracking(
+                    read, frames, tuple(tracks), own, auto=auto, hold=self._held, ranges=_stopped_by(cancelled))
                 for step in tracking.steps():
                     steps.append(step)
                     progress((number + step.done / step.total) / max(1, len(groups)))
@@ -73,7 +74,8 @@ class Work:
         made, count = [], len(self.plate.frames)
         with self._opened(cancelled) as read:
             for number, plane in enumerate(planes):
-                for done, step in enumerate(plane_steps(plane, read, self.plate.frames, hold=self._held)):
+                for done, step in enumerate(plane_steps(
+                        plane, read, self.plate.frames, hold=self._held, ranges=_stopped_by(cancelled))):
                     plane = step
                     progress(min((number + done / count) / len(planes), 1.0))
                 made.append(plane)
@@ -243,3 +245,15 @@ class MatchTracking(QObject):
     def _forget(self) -> None:
         self._steps, self._tails = deque(), {}
         self.made.emit()
+
+
+def _stopped_by(cancelled: Asked) -> Callable[[int, Callable[[int, int], object], int], None]:
+    """Ranges one after the other as the tracker asks for them, and none any more once the job was cancelled."""
+
+    def ranges(count: int, call: Callable[[int, int], object], grain: int = 2048) -> None:
+        for start in range(0, count, max(grain, 1)):
+            if cancelled():
+                raise Cancelled
+            call(start, min(start + grain, count))
+
+    return ranges
