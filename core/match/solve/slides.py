@@ -21,6 +21,8 @@ def drift_gains(state: State, observations: Observations, tracks: int, sigma: fl
 
     sigma : standard deviation of the whitened residuals of an axis.
     """
+    if not len(observations.track):
+        return np.zeros(tracks)
     count = np.bincount(observations.track, minlength=tracks)
     frame = observations.frame.astype(np.float64)
     mean = np.bincount(observations.track, weights=frame, minlength=tracks) / np.maximum(count, 1)
@@ -29,19 +31,21 @@ def drift_gains(state: State, observations: Observations, tracks: int, sigma: fl
     np.maximum.at(span, observations.track, np.abs(away))
     pace = away / np.maximum(span[observations.track], 1.0)
     points = state.points[observations.track]
-    _, depth = projected(state, observations.frame, points)
+    here, depth = projected(state, observations.frame, points)
     step = STEP * np.maximum(np.abs(depth), 1e-9)
-    columns = []
-    for axis in np.eye(3):
+    slope = np.empty((len(frame), 2, 6))  # of the point, of the drift, and the residual itself
+    for k, axis in enumerate(np.eye(3)):
         ahead, _ = projected(state, observations.frame, points + step[:, None] * axis)
-        behind, _ = projected(state, observations.frame, points - step[:, None] * axis)
-        columns.append(whitened(observations, (ahead - behind) / (2.0 * step[:, None])))
-    for side in np.eye(2):
-        columns.append(whitened(observations, pace[:, None] * side))
-    slope = np.stack(columns, axis=2)  # (N, 2, 5)
-    matrix, right = np.zeros((tracks, 5, 5)), np.zeros((tracks, 5))
-    np.add.at(matrix, observations.track, np.einsum("nij,nik->njk", slope, slope))
-    np.add.at(right, observations.track, np.einsum("nij,ni->nj", slope, residuals(state, observations)))
+        slope[:, :, k] = whitened(observations, (ahead - here) / step[:, None])
+    for k, side in enumerate(np.eye(2)):
+        slope[:, :, 3 + k] = whitened(observations, pace[:, None] * side)
+    slope[:, :, 5] = residuals(state, observations)
+    order = np.argsort(observations.track, kind="stable")
+    first = np.flatnonzero(np.diff(observations.track[order], prepend=-1))
+    sums = np.add.reduceat(np.matmul(slope.transpose(0, 2, 1), slope)[order], first, axis=0)
+    whole = np.zeros((tracks, 6, 6))
+    whole[observations.track[order][first]] = sums
+    matrix, right = whole[:, :5, :5], whole[:, :5, 5]
     inner = np.linalg.pinv(matrix[:, :3, :3], rcond=1e-10, hermitian=True)
     across = matrix[:, 3:, :3] @ inner
     left = matrix[:, 3:, 3:] - across @ matrix[:, :3, 3:]
