@@ -14,7 +14,9 @@ from app.window.desk import Desk
 from app.window.theme import look_of, text_font
 from core.document import Document, MeshObject, find_mesh
 from core.groom.groom import Groom, Map
+from core.groom.guides import Guides
 from core.mesh.mesh import Mesh
+from viewport.kept import same
 
 NO_GROOM = "There is no groom: choose one in the scene to see its maps."
 NO_UVS = "This mesh has no UVs. Maps from images need them: unwrap the mesh and reload it. Maps per vertex work."
@@ -46,6 +48,7 @@ class UvView(QWidget):
         self._held: QPointF | None = None
         self._hover: QPointF | None = None
         self._still: tuple[object, ...] = ()
+        self._rooted: tuple[object, ...] = ()  # roots and which are selected, as the picture has them
         self._pixmap = QPixmap()
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -216,7 +219,6 @@ class UvView(QWidget):
             return
         painter.setClipRect(area.adjusted(1, 1, -1, -1))
         self._paint_still(painter)
-        self._paint_roots(painter)
         about = self.about
         if about:
             box = QRectF(0.0, self.height() - look.row, self.width(), look.row)
@@ -225,17 +227,19 @@ class UvView(QWidget):
             painter.drawText(box.adjusted(8, 0, -8, 0), Qt.AlignmentFlag.AlignVCenter, about)
 
     def _paint_still(self, painter: QPainter) -> None:
-        """Map and edges, from a picture of them while nothing of it has changed."""
-        look, ratio = look_of(), self.devicePixelRatioF()
+        """Map, edges and roots, from a picture of them while nothing of it has changed."""
+        look, ratio, guides = look_of(), self.devicePixelRatioF(), self._guides()
         key = (id(self._shown), self.size(), ratio, self._middle.toTuple(), self._zoom, id(look))
-        if key != self._still:
+        rooted = () if guides is None else (guides.roots, guides.selected)
+        if key != self._still or not same(rooted, self._rooted):
             self._pixmap = QPixmap(self.size() * ratio)
             self._pixmap.setDevicePixelRatio(ratio)
             self._pixmap.fill(Qt.GlobalColor.transparent)
             layer = QPainter(self._pixmap)
             self._draw_still(layer)
+            self._draw_roots(layer, guides)
             layer.end()
-            self._still = key
+            self._still, self._rooted = key, rooted
         painter.drawPixmap(0, 0, self._pixmap)
 
     def _draw_still(self, painter: QPainter) -> None:
@@ -269,15 +273,21 @@ class UvView(QWidget):
         seen = (high[:, 0] >= 0) & (low[:, 0] <= self.width()) & (high[:, 1] >= 0) & (low[:, 1] <= self.height())
         return places[seen]
 
-    def _paint_roots(self, painter: QPainter) -> None:
-        groom, look = self._desk.groom, look_of()
-        if groom is None or not len(groom.guides):
+    def _guides(self) -> Guides | None:
+        """Those of the active groom."""
+        groom = self._desk.groom
+        return None if groom is None else groom.guides
+
+    def _draw_roots(self, painter: QPainter, guides: Guides | None) -> None:
+        look = look_of()
+        if guides is None or not len(guides):
             return
-        uvs, side = groom.guides.roots.uvs, self._side()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        uvs, side = guides.roots.uvs, self._side()
         x = self.width() / 2 + (uvs[:, 0] - self._middle.x()) * side
         y = self.height() / 2 - (uvs[:, 1] - self._middle.y()) * side
         seen = (x >= 0) & (x <= self.width()) & (y >= 0) & (y <= self.height())
-        picked = groom.guides.selected
+        picked = guides.selected
         for rows, name, width in ((seen & ~picked, "accent", 2.5), (seen & picked, "text", 4.0)):
             pen = QPen(look.theme.colour(name, 0.9), width)
             pen.setCapStyle(Qt.PenCapStyle.RoundCap)
