@@ -125,24 +125,17 @@ def _one_guide(coat: Coat, places: Scatter) -> list[Row]:
 def _quality(coat: Coat) -> list[Row]:
     """Continuity, exactness and leakage as the study measured them: 100,000 pairs, random directions.
 
-    The study's directions are not known, and the largest angle is that of one pair whose guides happen to point
-    against each other (it goes from half to six times its median between draws of the directions), while the 99.9th
-    percentile hardly depends on the draw; so the rows are medians of 25 draws, and the largest comes with its range.
+    The study drew once, and its draw is not known. The largest angle is that of one pair whose guides happen to point
+    against each other: it goes from half to six times its median between draws of the directions, and by half between
+    scatters of the guides and of the pairs, while the 99.9th percentile hardly depends on the draw. So the rows are
+    medians of 25 draws, five of the directions on each of five scatters, and the largest comes with its range.
     """
     skin = coat.skin.astype(np.float64), coat.triangles
     edge = skins.mean_edge(skin)
     rows = []
     for count in (500, 4000):
-        rng = np.random.default_rng(count)
-        where = scatter(coat.skin, coat.triangles, count, 0)
-        corners = skin[0][coat.triangles[where.triangle]]
-        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        t, b = skins.sample(skin, 100_000, rng)
         for share, target in ((0.1, 83.0 if count == 500 else 78.0), (0.001, 0.9)):
-            t2, b2, arrived = skins.walk(skin, t, b, share * edge, rng)
-            both = np.concatenate([t[arrived], t2[arrived]]), np.concatenate([b[arrived], b2[arrived]])
-            found = bind(*skin, *where, *both)
-            draws = [_angles(found, _headings(face, seed)) for seed in range(25)]
+            draws = [angles for seed in range(5) for angles in _draws(coat, count, share * edge, seed)]
             if share == 0.1:
                 rare = float(np.median([np.percentile(a, 99.9) for a in draws]))
                 what = f"continuity, {count:,} guides, 99.9 % of children {share} edge apart within"
@@ -151,12 +144,27 @@ def _quality(coat: Coat) -> list[Row]:
             what = f"continuity, {count:,} guides, largest angle between children {share} edge apart"
             rows.append(Row(f"{what}, median of 25 draws", float(np.median(angles)), "degrees", target))
             rows += [Row("  least and", min(angles), "degrees"), Row("  most of the draws", max(angles), "degrees")]
+        where = scatter(coat.skin, coat.triangles, count, 0)
         own = bind(*skin, *where, *where)
         weight = (own.weights * (own.sites == np.arange(count)[:, None])).sum(axis=1)
         rows.append(Row(f"exactness, {count:,} guides, least own weight", float(weight.min()), "", 0.9996, True))
     rows.append(Row("leakage between separate legs 0.02 apart", _leak(), "%", 0))
     rows.append(Row("leakage through a folded sheet 0.02 apart, border included", _sheet_leak(), "%", 0))
     return rows
+
+
+def _draws(coat: Coat, count: int, apart: float, seed: int) -> list[NDArray[np.float64]]:
+    """Angles between 100,000 pairs of children so far `apart`, for each of five draws of the guides' directions."""
+    skin = coat.skin.astype(np.float64), coat.triangles
+    rng = np.random.default_rng((count, seed))
+    where = scatter(coat.skin, coat.triangles, count, seed)
+    corners = skin[0][coat.triangles[where.triangle]]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    t, b = skins.sample(skin, 100_000, rng)
+    t2, b2, arrived = skins.walk(skin, t, b, apart, rng)
+    both = np.concatenate([t[arrived], t2[arrived]]), np.concatenate([b[arrived], b2[arrived]])
+    found = bind(*skin, *where, *both)
+    return [_angles(found, _headings(face, 5 * seed + draw)) for draw in range(5)]
 
 
 def _headings(face: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
