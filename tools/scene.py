@@ -7,7 +7,12 @@ from core.workspace import Workspace
 
 
 def active_mesh(document: Document, workspace: Workspace) -> MeshObject | None:
-    """The mesh the artist is at: the one under the groom that tools edit, else the first; None without meshes."""
+    """The mesh the artist is at: in the craft of posing the one that is posed, else the one under the groom that tools
+    edit, else the first; None without meshes."""
+    if workspace.craft == "pose":
+        rigged = [item for item in document.meshes if item.rig is not None]
+        if rigged:
+            return next((item for item in rigged if item.id == workspace.mesh), rigged[0])
     if any(groom.id == workspace.groom for groom in document.grooms):
         return find_mesh(document, find_groom(document, workspace.groom or 0).mesh_id)
     if document.grooms:

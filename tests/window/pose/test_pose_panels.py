@@ -525,3 +525,48 @@ def test_a_sculpt_is_read_while_the_window_goes_on(posing: Hand, tmp_path: Path)
     posing.window.import_sculpt(tmp_path / "few.obj")
     posing.until(lambda: bool(said))
     assert "few.obj" in said[0]
+
+
+def test_what_is_posed_is_isolated(posing: Hand) -> None:
+    desk = posing.window.desk
+    desk.set_workspace(mesh=2)
+    posing.window.commands.run("view.isolate")
+    assert desk.workspace.view.isolated == (2,)
+    posing.window.commands.run("view.isolate")
+    desk.set_workspace(mesh=1)
+    posing.window.commands.run("view.isolate")
+    assert desk.workspace.view.isolated == (1,)
+
+
+def test_weights_are_painted_by_the_hand_and_kept_in_order_by_actions(posing: Hand) -> None:
+    desk, run = posing.window.desk, posing.window.commands.run
+    desk.edit("Select joint", select_joints, 1, ("elbow",))
+    joint = desk.posed.rig.skeleton.names.index("elbow")
+
+    def share() -> np.ndarray:
+        skin = desk.posed.rig.skin
+        return np.where(skin.joints == joint, skin.weights, 0.0).sum(axis=1)
+
+    x, y = elbow_on_screen(posing)
+    desk.choose("weights")
+    before = share()
+    posing.drag((x, y), (x + 0.03, y), steps=4)
+    assert desk.session.history.undo_name == "Paint weights"
+    painted = share() - before
+    assert painted.max() > 0.05
+    assert painted.min() >= -1e-6
+    posing.drag((x, y), (x + 0.03, y), modifiers=Qt.KeyboardModifier.ControlModifier, steps=4)
+    assert (share() - before - painted).min() < -0.05
+    for command in ("smooth_weights", "prune_weights", "limit_influences", "normalise_weights"):
+        run(f"pose.{command}")
+        skin = desk.posed.rig.skin
+        assert skin.weights.sum(axis=1) == pytest.approx(np.ones(len(skin.weights)), abs=1e-6)
+    assert ((skin.weights > 0).sum(axis=1) <= 4).all()
+    assert skin.weights[skin.weights > 0].min() >= 0.009
+    run("pose.lock_joints")
+    said: list[str] = []
+    desk.failed.connect(lambda words, details: said.append(words))
+    locked = share()
+    posing.drag((x, y), (x + 0.03, y), steps=4)
+    assert "locked" in said[0]
+    assert (share() == locked).all()
