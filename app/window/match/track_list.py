@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
-from PySide6.QtGui import QPainter
+from PySide6.QtGui import QMouseEvent, QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -33,6 +33,7 @@ from core.workspace import Workspace
 from tools.match_edits import select_tracks, selected_tracks, shown_plate
 
 MOST_ROWS = 12
+MARGIN = 3  # pixels beside the spans
 ROLE = Qt.ItemDataRole.UserRole
 HEADS = ("Track", "Frames", "Error", "Like", "Seen")
 TO_THE_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -41,7 +42,7 @@ TIPS = (
     "On how many frames the track is seen.",
     "The largest error the track foretells of itself, in pixels of the plate.",
     "How like its key the pattern is on the worst frame, from 0 to 1.",
-    "Where along the plate the track is seen; its keys are brighter.",
+    "Where along the plate the track is seen; its keys are brighter. A click goes to that frame.",
 )
 CURVES = ("motion", "speed", "error", "likeness")
 _GRAPH = Field("Curve", "What is plotted of the active track over the frames; a click goes to a frame.")
@@ -141,10 +142,12 @@ class TrackList(QWidget):
             ids = tuple(int(item.data(0, ROLE)) for item in self.list.selectedItems())
             self.desk.attempt(self.desk.session.amend, "Select tracks", select_tracks, ids)
 
-    def _clicked(self, item: QTreeWidgetItem) -> None:
+    def _clicked(self, item: QTreeWidgetItem, place: int) -> None:
         plate = shown_plate(self.desk.document)
         track = next((t for t in self.desk.document.tracks if t.id == item.data(0, ROLE)), None)
-        if plate is not None and track is not None and len(track.frames):
+        if plate is not None and place == len(HEADS) - 1:
+            self.desk.set_workspace(frame=float(self.list.frame_pressed(plate) + plate.offset))
+        elif plate is not None and track is not None and len(track.frames):
             worst = int(track.frames[int(np.argmax(errors_of(track) + (1.0 - track.score)))])
             self.desk.set_workspace(frame=float(worst + plate.offset))
 
@@ -165,6 +168,7 @@ class _Tracks(QTreeWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self._pressed = 0.0
         self.setRootIsDecorated(False)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setUniformRowHeights(True)
@@ -185,6 +189,17 @@ class _Tracks(QTreeWidget):
         return QSize(180, rows * (look_of().row + 1) + 6)
 
     minimumSizeHint = sizeHint
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = event.position().x()
+        super().mousePressEvent(event)
+
+    def frame_pressed(self, plate: Plate) -> int:
+        """The frame of the plate where the hand pressed in the column that shows where tracks are seen."""
+        last = len(HEADS) - 1
+        left = self.columnViewportPosition(last) + MARGIN
+        share = (self._pressed - left) / max(self.columnWidth(last) - 2 * MARGIN, 1)
+        return min(max(plate.first + int(share * len(plate.frames)), plate.first), plate.last)
 
     def fill(self, plate: Plate, tracks: list[Track], chosen: tuple[int, ...]) -> None:
         """Show these tracks in this order."""
@@ -225,7 +240,7 @@ class _Spans(QStyledItemDelegate):
         if not found:
             return
         track, plate = found
-        theme, box = look_of().theme, QRectF(option.rect).adjusted(3, 0, -3, 0)  # type: ignore[attr-defined]
+        theme, box = look_of().theme, QRectF(option.rect).adjusted(MARGIN, 0, -MARGIN, 0)  # type: ignore[attr-defined]
         count = max(1, plate.last - plate.first + 1)
         painter.save()
         painter.setPen(Qt.PenStyle.NoPen)

@@ -13,6 +13,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.window.commands import Command
+from app.window.match import doors
 from app.window.match.commands import MATCH
 from app.window.match.plate_panel import PlatePanel
 from app.window.match.track_list import TrackList
@@ -264,3 +265,42 @@ def test_a_point_is_followed_by_a_drawn_pattern_beside_it(opened: Opened, plate:
     (track,) = desk.document.tracks
     assert len(track.frames) == COUNT
     assert np.abs(track.points - track.points[0] - np.arange(COUNT)[:, None] * STEP).max() < 0.2
+
+
+def test_tracks_go_out_and_in_by_the_dialogs_and_a_click_on_their_span_goes_to_a_frame(
+    opened: Opened, plate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hand = opened_plate(opened, plate)
+    desk, tracks = hand.window.desk, hand.window.findChild(TrackList)
+    said: list[str] = []
+    desk.failed.connect(lambda words, details: said.append(words))
+    rows = np.column_stack([np.arange(FIRST, FIRST + COUNT), *np.linspace((50.0, 60.0), (90.0, 70.0), COUNT).T])
+    desk.edit("Tracks", edits.add_tracks, (keyed_track(1, "eye", rows),), desk.document.plates[0].id)
+    wanted: list[Path] = []
+    monkeypatch.setattr(doors, "choose_file", lambda parent, title, kinds, done, save="": done(wanted[-1]))
+    for suffix in (".json", ".nk", ".3de", ".2dt", ".uv", ".boujou", ".syntheyes"):
+        wanted.append(tmp_path / f"tracks{suffix}")
+        hand.window.commands.run("file.export_tracks")
+        hand.until(lambda: wanted[-1].exists() and not desk.jobs.running)
+        before = len(desk.document.tracks)
+        hand.window.commands.run("file.import_tracks")
+        hand.until(lambda before=before: len(desk.document.tracks) > before)
+        found = desk.document.tracks[-1]
+        assert found.frames.tolist() == rows[:, 0].tolist(), suffix
+        assert np.abs(found.points - rows[:, 1:]).max() < 1e-2, suffix
+        desk.session.undo()
+    wanted.append(tmp_path / "tracks.odd")
+    hand.window.commands.run("file.export_tracks")
+    assert "tracks are written as" in said[-1]
+    (tmp_path / "broken.nk").write_text("Tracker4 {")
+    wanted.append(tmp_path / "broken.nk")
+    hand.window.commands.run("file.import_tracks")
+    hand.until(lambda: len(said) > 1)
+    assert "broken.nk" in said[-1]
+    hand.until(tracks.isVisible)
+    tree = tracks.list
+    tree.scrollToItem(tree.topLevelItem(0))
+    middle = tree.visualItemRect(tree.topLevelItem(0)).center().y()
+    left, wide = tree.columnViewportPosition(4), tree.columnWidth(4)
+    QTest.mouseClick(tree.viewport(), LEFT, pos=QPoint(left + round(0.75 * wide), middle))
+    assert desk.workspace.frame == FIRST + 7
