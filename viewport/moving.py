@@ -103,9 +103,11 @@ class Moving:
         self._draw_base(scene, camera, size, options, uniforms, maps)
         assert self.base is not None
         maps.bind()
+        # under a brush, amidst a finished picture, one look at the light serves; in a turning view it would shimmer
+        softness = {} if picture is None else {"tap_reach": 0}
         for drawable in drawables:
             self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            _finish(drawable.work_out({**uniforms, "sparse": self._strands_across(drawable) > 1.0, "tap_reach": 0}))
+            _finish(drawable.work_out({**uniforms, **softness, "sparse": self._strands_across(drawable) > 1.0}))
         self.opening = False
         behind = self.base if picture is None else self._patched(scene, camera, picture, uniforms["clip_from_world"])
         self.touched = []
