@@ -90,7 +90,7 @@ def delete_plate(document: Document, plate_id: int) -> Document:
     rest = tuple(plate for plate in document.plates if plate.id != plate_id)
     changed: Document = document.replace(
         plates=rest, **{kind: tuple(m for m in getattr(document, kind) if m.plate_id != plate_id)
-                        for kind in ("tracks", "planes", "masks")})
+                        for kind in ("tracks", "planes", "masks", "solves")})
     left = {track.id for track in changed.tracks}
     changed = changed.replace(track_selection=tuple(i for i in changed.track_selection if i in left))
     return show_plate_in_step(changed, rest[0].id) if rest and shown_plate(changed) is None else changed

@@ -37,6 +37,7 @@ from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
 from app.window.match.plate_panel import PlatePanel
+from app.window.match.solve_panel import SolvePanel
 from app.window.match.track_list import TrackList
 from app.window.match.view import PlateView
 from app.window.memory import give_back_freed_memory
@@ -146,6 +147,7 @@ class MainWindow(QMainWindow):
             ("rig", Section(PANELS["rig"][0], RigPanel(self.desk), memory, "rig")),
             ("respect", RespectPanel(self.desk, memory)),
             ("tracks", Section(PANELS["tracks"][0], TrackList(self.desk), memory, "tracks")),
+            ("solve", Section(PANELS["solve"][0], SolvePanel(self.desk, self.match.solving), memory, "solve")),
             ("plate", Section(PANELS["plate"][0], PlatePanel(self.desk, memory), memory, "plate")),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),

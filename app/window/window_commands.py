@@ -24,6 +24,7 @@ PANELS = {
     "pose_map": ("Pose map", "Shows or hides the map of pose space beside the model."),
     "plate": ("Plates", "Shows or hides the list of plates, with film, crop, colours and what tracking sees."),
     "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
+    "solve": ("Solve", "Shows or hides the solved camera: how good it is, what may be wrong, what to mend."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
     "history": ("History", "Shows or hides the list of steps that undo goes through."),
@@ -33,7 +34,7 @@ PANELS = {
 # panels that belong to one craft; the others are those of all
 PANEL_CRAFTS = {
     "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "rig": "pose",
-    "pose_map": "pose", "tracks": "match", "plate": "match",
+    "pose_map": "pose", "tracks": "match", "solve": "match", "plate": "match",
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
 AT_FIRST_HIDDEN = ("curves",)

@@ -101,9 +101,11 @@ def read_colmap(path: Path) -> Shot:
         images = (_images_of_binary if binary else _images_of_text)(data[1])
         points = (_points_of_binary if binary else _points_of_text)(data[2])
         lenses = {key: _lens(model, size, values) for key, (model, size, values) in cameras.items()}
-        images = [(_frame_of(name, k), pose, camera) for k, (pose, camera, name) in enumerate(images)]
-        return _shot([(frame, Rotation.from_quat(np.array(pose)[[1, 2, 3, 0]]).as_matrix(), np.array(pose[4:]),
-                       lenses[camera], cameras[camera][1]) for frame, pose, camera in images], points, path.name)
+        found = []
+        for k, (pose, camera, name) in enumerate(images):
+            turn = Rotation.from_quat(np.array(pose)[[1, 2, 3, 0]]).as_matrix()
+            found.append((_frame_of(name, k), turn, np.array(pose[4:]), lenses[camera], cameras[camera][1]))
+        return _shot(found, points, path.name)
     except (struct.error, ValueError, KeyError, IndexError, OverflowError, UnicodeDecodeError):
         raise UserError(f"{path.name}: COLMAP's model is cut or damaged.") from None
 

@@ -11,6 +11,7 @@ from core.match.follow import Way
 from tools import match_edits
 from tools.match_edits import selected_tracks, shown_plate
 from tools.plate_edits import show_next_plate
+from tools.solve_edits import forget_solve, solved_of, tracks_to_solve, turn_cube
 
 if TYPE_CHECKING:
     from app.window.desk import Desk
@@ -43,6 +44,27 @@ def needs_plates(desk: Desk) -> str | None:
     return None if len(desk.document.plates) > 1 else "There is no other plate: open one from the File menu."
 
 
+def needs_tracks(desk: Desk) -> str | None:
+    """The plate in view must have tracks."""
+    plate = shown_plate(desk.document)
+    if plate is None:
+        return NO_PLATE
+    return None if tracks_to_solve(desk.document, plate.id) else "This plate has no tracks yet: place some first."
+
+
+def needs_solved_plate(desk: Desk) -> str | None:
+    """The plate in view must have a solved camera."""
+    plate = shown_plate(desk.document)
+    if plate is None:
+        return NO_PLATE
+    return None if solved_of(desk.document, plate.id) is not None else "The camera is not solved yet: solve it first."
+
+
+def needs_solve(desk: Desk) -> str | None:
+    """A track must be selected, and the camera of its plate solved."""
+    return needs_track(desk) or needs_solved_plate(desk)
+
+
 def frame_of(desk: Desk) -> int:
     """The frame of the desk as the files of the plate in view count."""
     plate = shown_plate(desk.document)
@@ -52,6 +74,11 @@ def frame_of(desk: Desk) -> int:
 def chosen(desk: Desk) -> tuple[int, ...]:
     """Ids of the selected tracks."""
     return tuple(track.id for track in selected_tracks(desk.document))
+
+
+def _plate_id(desk: Desk) -> int:
+    plate = shown_plate(desk.document)
+    return 0 if plate is None else plate.id
 
 
 def _follow(way: Way, everything: bool = False) -> Callable[[Window], None]:
@@ -149,6 +176,15 @@ MATCH: tuple[Command, ...] = (
     _command("planes", "Track planes", "Follows every plane that is not locked or hidden through the whole plate.",
              lambda w: w.match.tracking.track_planes(), "core.match.plane_tracker.plane_steps", "Track planes",
              needs_plate, "corner pin planar"),
+    _command("solve", "Solve camera", "Finds the camera of the plate and where the points are, from the tracks shown.",
+             lambda w: w.match.solving.solve(), "core.match.solve.solve.solve", "Solve camera", needs_tracks,
+             "matchmove 3d camera reconstruct calibrate"),
+    _command("cube", "Cube at track", "Stands a test cube on the point of the track, or takes it away.",
+             lambda w: w.desk.edit("Test cube", turn_cube, chosen(w.desk)[-1]), "tools.solve_edits.turn_cube",
+             "Test cube", needs_solve, "test object box insert"),
+    _command("forget_solve", "Forget the solve", "Takes the solved camera of the plate away; tracks stay.",
+             lambda w: w.desk.edit("Forget the solve", forget_solve, _plate_id(w.desk)),
+             "tools.solve_edits.forget_solve", "Forget the solve", needs_solved_plate, "camera remove"),
     _command("delete_shapes", "Delete all planes and masks here",
              "Takes all planes and masks seen here out; the list of them deletes single ones.",
              lambda w: w.desk.edit("Delete shapes", match_edits.delete_shapes, frame_of(w.desk)),
@@ -217,4 +253,7 @@ PLATE_FILES: tuple[Command, ...] = (
     Command("file.export_tracks", "Export tracks…", "Writes the tracks of the plate; its suffix names the program.",
             lambda w: w.match.doors.ask_export(), "core.formats.track_file.write_tracks", "file", enabled=needs_plate,
             icon="export", words="2d save points nuke 3de blender"),
+    Command("file.export_camera", "Export camera…", "Writes the solved camera; its suffix names the program.",
+            lambda w: w.match.doors.ask_export_camera(), "core.formats.shot_file.write_shot", "file",
+            enabled=needs_solved_plate, icon="export", words="3d save solve usd nuke maya blender colmap matchmove"),
 )

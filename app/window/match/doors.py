@@ -18,9 +18,12 @@ from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
+from core.match.solved import SolvedCamera, shot_of_record
 from tools.match_edits import add_plate, add_tracks, shown_plate
 from tools.plate_edits import relink_plate
+from tools.solve_edits import solved_of
 
+CAMERAS = (".usda", ".usdc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
 
 
@@ -118,6 +121,29 @@ class MatchDoors(QObject):
         self._desk.jobs.start(
             f"Write {path.name}", lambda progress, cancelled: work(),
             lambda nothing: self._desk.said.emit(f"{len(tracks)} tracks were written to {path.name}."))
+
+    def ask_export_camera(self) -> None:
+        """Let the artist name a file for the solved camera; its suffix says for which program."""
+        self._solved()
+        choose_file(self._parent, "Export camera", [filter_of("Cameras", CAMERAS)],
+                    lambda path: self._desk.attempt(self.export_camera, path), save=".usda")
+
+    def export_camera(self, path: Path) -> None:
+        """Write the solved camera of the plate in view with its points."""
+        from core.formats.shot_file import check_writable, write_shot  # the solver with it, which is large
+
+        check_writable(path)
+        solved = self._solved()
+        shot = shot_of_record(solved, {track.id: track.name for track in self._desk.document.tracks})
+        self._desk.jobs.start(
+            f"Write {path.name}", lambda progress, cancelled: write_shot(path, shot, {"kind": solved.kind}),
+            lambda nothing: self._desk.said.emit(f"The camera was written to {path.name}."))
+
+    def _solved(self) -> SolvedCamera:
+        solved = solved_of(self._desk.document, self._plate().id)
+        if solved is None:
+            raise UserError("The camera of this plate is not solved yet: solve it first.")
+        return solved
 
     def _plate(self) -> Plate:
         plate = shown_plate(self._desk.document)

@@ -16,10 +16,13 @@ from app.window.match.eye import PlateEye
 from app.window.match.marks import Sheet, errors_of, marks_of
 from app.window.match.pattern import patches
 from app.window.match.screen import PlateScreen, Shown
+from app.window.match.solve_job import SolveJob
+from app.window.match.solve_marks import solve_marks
 from app.window.match.tracking import MatchTracking
 from core.image.plate_view import pixels_per_pixel, plate_size
 from core.overlay import Fill, Overlays, Polyline
 from tools.match_edits import place_at, selected_tracks
+from tools.solve_edits import solved_of
 from tools.tool import Pointer
 from viewport.plate import Box, PlatePicture
 from viewport.view import HudLine, View3D
@@ -41,6 +44,7 @@ class PlateView(QObject):
         self.eye = PlateEye(desk, size, self.fresh.emit)
         self.screen = PlateScreen(desk)
         self.tracking = MatchTracking(desk)
+        self.solving = SolveJob(desk)
         self.doors = MatchDoors(desk, window)
         self.screen.fresh.connect(self.fresh)
         self.tracking.made.connect(self.fresh)
@@ -71,6 +75,9 @@ class PlateView(QObject):
         shown = self.screen.picture(plate, frame)
         sheet = Sheet(plate, frame, camera, size, ratio)
         marks = marks_of(self.desk.document, sheet) + self._live(sheet)
+        solved = solved_of(self.desk.document, plate.id)
+        if solved is not None:
+            marks += solve_marks(solved, sheet)
         box = self._box(sheet)
         small = patches(self.desk.document, self.screen, sheet, pointer)
         marks += small.marks
