@@ -135,8 +135,8 @@ def test_opensfm_is_read(tmp_path):
 
 @pytest.mark.parametrize(("name", "data"), [
     ("cameras.txt", b"1 OPENCV 10"), ("cameras.bin", struct.pack("<Q", 1 << 60)),
-    ("a.nk", b"Camera2 {\n translate {{curve x}}\n}\n"), ("a.nk", b""), ("a.chan", b"1 2 3"), ("a.chan", b""), ("a.out", b"99999999999 1"), ("a.json", b"[]"),
-    ("a.json", b"[[["), ("a.usda", b"#usda 1.0\n"), ("a.abc", b""),
+    ("a.nk", b"Camera2 {\n translate {{curve x}}\n}\n"), ("a.nk", b""), ("a.chan", b"1 2 3"), ("a.chan", b""),
+    ("a.out", b"99999999999 1"), ("a.json", b"[]"), ("a.json", b"[[["), ("a.usda", b"#usda 1.0\n"), ("a.abc", b""),
 ])  # fmt: skip
 def test_broken_files_are_refused_in_words(name, data, tmp_path):
     for part in ("images", "points3D"):
