@@ -19,7 +19,7 @@ from core.errors import UserError
 
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
 COMMANDS = (
-    "window", "groom", "feathers", "convert", "info", "check", "render", "pose", "track",
+    "window", "groom", "feather", "feathers", "convert", "info", "check", "render", "pose", "track",
     "flow", "solve", "stmap", "photomodel", "run", "bake", "publish", "bench", "doctor", "demo",
 )
 HELP = ("-h", "--help")

@@ -109,8 +109,31 @@ def match_window(plate: Path) -> None:
         hand.window.close_unasked()
 
 
+def feathers() -> None:
+    """Every preset of a feather, six in a row, in the order of their names."""
+    from app.commands.feather import LIGHT, TOWARDS
+    from core.camera import frame_points
+    from core.feather.levels import feather_mesh
+    from core.feather.presets import preset_names, preset_values
+    from viewport.context import temporary_context
+    from viewport.picture import render
+    from viewport.scene import Scene
+
+    pictures = []
+    with temporary_context() as context:
+        for name in preset_names():
+            mesh = feather_mesh(preset_values(name), 3)
+            scene = Scene(feathers=(mesh,), background=LIGHT)
+            pictures.append(render(scene, frame_points(mesh.points, TOWARDS, 0.6), 240, 400, 3, ctx=context))
+    while len(pictures) % 6:
+        pictures.append(np.full_like(pictures[0], 168))
+    sheet = np.concatenate([np.concatenate(pictures[i : i + 6], axis=1) for i in range(0, len(pictures), 6)])
+    cv2.imwrite(str(PICTURES / "feathers.jpg"), sheet[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
+
+
 def main() -> None:
     PICTURES.mkdir(exist_ok=True)
+    feathers()
     first_groom()
     first_pose()
     evaluator = Evaluator()

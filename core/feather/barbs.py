@@ -193,7 +193,8 @@ def condense(values: NDArray[np.float32], seeds: NDArray[Any], ranges: Any = ser
     columns = [np.zeros(int(starts[-1]), kind) for kind in kinds]
     found = np.zeros(len(table), np.int64)
     keys = np.ascontiguousarray(seeds, np.int64)
-    ranges(len(table), lambda a, b: _condense(table, keys, starts, a, b, *columns, found), grain=64)
+    call: Any = _condense  # numba's types know no unpacked arguments
+    ranges(len(table), lambda a, b: call(table, keys, starts, a, b, *columns, found), grain=64)
     kept = np.arange(int(starts[-1])) - np.repeat(starts[:-1], counts) < np.repeat(found, counts)
     if not kept.all():
         columns = [values[kept] for values in columns]
@@ -232,7 +233,8 @@ def expand(values: NDArray[np.float32], barbs: Barbs, feather: int, points: int 
     out = np.empty((count, points, 3), np.float32)
     places, flat = np.empty((count, points, 2), np.float32), np.empty((count, points, 2), np.float32)
     parts = [values[rows] for values in barbs[1:]]
-    _expand(_whole(values[None])[0], *parts, out, places, flat)
+    call: Any = _expand
+    call(_whole(values[None])[0], *parts, out, places, flat)
     return BarbCurves(out, (barbs.tone[rows] & 1).astype(np.intp), places, flat)
 
 

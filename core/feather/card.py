@@ -73,7 +73,7 @@ def card_of(values: Floats, fine: FeatherMesh) -> FeatherMesh:
     widths = np.array([_widest(values, 0), _widest(values, 1)])
     grid = np.empty((ROWS, len(across), 3))
     _bend(values, across, along, widths, grid)
-    up, right = np.gradient(grid, axis=0), np.gradient(grid, axis=1)
+    up, right = (np.asarray(np.gradient(grid, axis=axis)) for axis in (0, 1))
     normals, fibres = unit(np.cross(right, up)), unit(right * np.sign(across)[None, :, None] + 0.8 * up)
     flat = np.stack(np.meshgrid(across, along), axis=-1)
     sides = (flat[..., 0] >= 0.0).astype(np.intp)

@@ -52,9 +52,13 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
 def joined(parts: list[FeatherMesh]) -> FeatherMesh:
     """Several meshes as one, with the optics of the first."""
     starts = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
-    columns = [np.concatenate(column) for column in zip(*(part[:8] for part in parts), strict=True)]
+    points, normals, fibres, colors, light, film, opacity, flat = (
+        np.concatenate(column) for column in zip(*(part[:8] for part in parts), strict=True)
+    )
     triangles = np.concatenate([part.triangles + np.int32(at) for part, at in zip(parts, starts, strict=True)])
-    return FeatherMesh(*columns, triangles, parts[0].optics)
+    return FeatherMesh(
+        points, normals, fibres, colors, light, film, opacity, flat, triangles, parts[0].optics
+    )  # fmt: skip
 
 
 def strips(count: int, points: int) -> NDArray[np.int32]:
