@@ -40,7 +40,7 @@ ROWS, COLUMNS = 8, 5  # of a vane as it is layered
 STANDING = 0.28  # radians, lift of feathers without keys
 SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
 BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
-GIVE = np.radians(1.4)  # by which a frame may lift a feather where the skin does not bend
+GIVE = np.radians(1.2)  # by which a frame may lift a feather where the skin does not bend
 ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
 FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
 

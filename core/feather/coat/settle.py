@@ -26,7 +26,7 @@ from core.mesh.bvh_kernels import STACK_SIZE
 
 LIFTS = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 9.5, 12.5, 16.0])
 ROLLS = np.radians([0.0, 4.0, -4.0])
-LENGTHS = np.array([1.0, 0.87, 0.75, 0.64, 0.54, 0.45, 0.36, 0.28, 0.2, 0.1, 0.04])
+LENGTHS = np.array([1.0, 0.87, 0.75, 0.64, 0.54, 0.45, 0.36, 0.28, 0.2, 0.1, 0.04, 0.01])
 BENT_BACK = 1.2  # of an added lift, taken back along the feather so that its tip does not stand out
 HALVINGS = 5
 
