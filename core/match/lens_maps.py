@@ -13,6 +13,7 @@ from core.match.lens import bent, straightened
 Array = NDArray[np.float64]
 MOST_PIXELS = 1 << 27
 ROWS = 256  # worked on at once
+TINY = 1e-6  # pixels
 MOST_OVERSCAN = 1.0  # of the plate on every side; a wider lens is cut there
 
 
@@ -43,7 +44,7 @@ def canvas(lens: Array, size: tuple[int, int], overscan: float | None = None) ->
             raise UserError("The lens leads no pixel of the plate anywhere; check its numbers.")
         out = np.concatenate([-xy.min(axis=0), xy.max(axis=0) - np.array([width - 1, height - 1])])
         most = np.array([width, height, width, height]) * MOST_OVERSCAN
-        x, y = (max(0, int(np.ceil(np.minimum(out, most)[k::2].max()))) for k in (0, 1))
+        x, y = (max(0, int(np.ceil(np.minimum(out, most)[k::2].max() - TINY))) for k in (0, 1))
         x, y = x + (x > 0), y + (y > 0)
     else:
         x, y = round(overscan * width), round(overscan * height)
