@@ -107,7 +107,9 @@ def feathered(document: Document) -> Document:
         attributes=(AttributeValue(name="shaftTwist", value=formula("0.2 * sin(frame) * age")),),
         key_attributes=KeyAttributes(
             ids=np.array([0, 3], np.int32), names=("vaneWidthLeft",), values=np.array([[0.1], [0.2]], np.float32)),
-        proxies=(Proxy(id=3, frames=frames, rest=shafts[0].astype(np.float32), shafts=shafts.astype(np.float32), rolls=np.zeros(2, np.float32)),),
+        proxies=(Proxy(
+            id=3, frames=frames, rest=shafts[0].astype(np.float32), shafts=shafts.astype(np.float32),
+            rolls=np.zeros(2, np.float32)),),
         ruffle=formula("0.1 * rand(id, 3)"), length=constant(1.1, "density"),
     )
     return with_feathers(document, coat)
