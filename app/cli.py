@@ -6,6 +6,7 @@ With ``--json`` standard output carries one object and nothing else: the result,
 
 from __future__ import annotations
 
+import ast
 import importlib
 import json
 import os
@@ -31,19 +32,33 @@ UsageError = typer.BadParameter.__base__
 
 def build(names: tuple[str, ...] = COMMANDS) -> typer.Typer:
     """The typer application with these commands; a command's module is only loaded when it is named."""
-    cli = typer.Typer(
+    cli = _empty()
+    for name in names:
+        module = importlib.import_module(f"app.commands.{name}")
+        cli.command(name, no_args_is_help=name not in ("window", "bench", "doctor", "demo"))(module.command)
+    return cli
+
+
+def overview() -> typer.Typer:
+    """The list of all commands with the words of their docstrings; none of their modules is loaded for it."""
+    cli = _empty()
+    for name in COMMANDS:
+        tree = ast.parse((Path(__file__).parent / "commands" / f"{name}.py").read_text("utf-8"))
+        found = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == "command")
+        cli.command(name, help=ast.get_docstring(found))(lambda: None)
+    return cli
+
+
+def _empty() -> typer.Typer:
+    return typer.Typer(
         name="filoplume",
-        help="Groom hair on real animals: by hand in a window, or meshes and coats in, coats and pictures out.",
+        help="Groom hair, set feathers, correct poses, match plates: by hand in a window, or files in and files out.",
         no_args_is_help=True,
         epilog="Without a command the window opens: filoplume [FILE], see filoplume window --help.",
         add_completion=False,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for name in names:
-        module = importlib.import_module(f"app.commands.{name}")
-        cli.command(name, no_args_is_help=name not in ("window", "bench", "doctor", "demo"))(module.command)
-    return cli
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -88,8 +103,8 @@ def _run(arguments: list[str]) -> int:
         arguments = ["window", *arguments]
     chosen = next((a for a in arguments if not a.startswith("-")), None)
     # one command alone would lose its name, so a second, light one stands beside it
-    names = tuple(dict.fromkeys((chosen, "run"))) if chosen in COMMANDS else COMMANDS
-    command = typer.main.get_command(build(names if len(names) > 1 else ("run", "bench")))
+    cli = overview() if chosen not in COMMANDS else build((chosen, "bench" if chosen == "run" else "run"))
+    command = typer.main.get_command(cli)
     return command(args=arguments, prog_name="filoplume", standalone_mode=False) or 0
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.cli import COMMANDS
 from tests.app.command_line import ROOT, filoplume, filoplume_process
 
 
@@ -216,10 +217,23 @@ def test_a_script_that_fails_names_its_line(tmp_path):
     assert "ZeroDivisionError" in done.stderr
 
 
-def test_the_list_of_commands_loads_no_qt_no_gl_and_no_library_of_formats():
+def test_the_list_of_commands_is_whole_and_loads_no_kernel_no_qt_no_gl_and_no_library_of_formats():
     code = (
-        "import sys, app.cli; app.cli.build(); print(sorted({m.split('.')[0] for m in sys.modules} & {'PySide6', "
-        "'moderngl', 'av', 'pxr', 'OpenImageIO', 'PyOpenColorIO', 'poselib', 'trimesh', 'alembic', 'rapidfuzz'}))")
+        "import sys, contextlib, app.cli\n"
+        "with contextlib.suppress(SystemExit): app.cli.main(['--help'])\n"
+        "print(sorted({m.split('.')[0] for m in sys.modules} & {'PySide6', 'moderngl', 'av', 'pxr', 'OpenImageIO', "
+        "'PyOpenColorIO', 'poselib', 'trimesh', 'alembic', 'rapidfuzz', 'numba', 'cv2'}))")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert done.stdout.strip().endswith("[]")
+    for name in COMMANDS:
+        assert f" {name} " in done.stdout
+
+
+def test_commands_load_no_qt_no_gl_and_no_library_of_formats_before_they_run():
+    code = (
+        "import sys, app.cli; app.cli.build(); print(sorted({m.split('.')[0] for m in sys.modules} & "
+        "{'PySide6', 'moderngl', 'av', 'pxr', 'OpenImageIO', 'PyOpenColorIO', 'poselib', 'trimesh', 'alembic', "
+        "'rapidfuzz'}))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout.strip() == "[]"
 
