@@ -12,6 +12,7 @@ from core.camera import Camera, frame_points
 from core.document import Document, find_mesh, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.pieces import FeatherMesh
 from core.formats import curve_file
 from core.formats.project import write_project
 from core.gate import seen_through
@@ -34,6 +35,7 @@ VIEWS = {
 }
 
 
+UNDER = 0.5  # of the colour of feathers: that of the skin they leave bare
 SAVED = "saved"  # the view as a project was left
 SIZE = (1600, 1000)
 
@@ -104,7 +106,7 @@ def posed_document(document: Document, frame: float | None, evaluator: Evaluator
 def draw(
     path: Path, document: Document, children: Mapping[int, Children], evaluator: Evaluator,
     size: tuple[int, int] = SIZE, view: str = "three-quarter", skins: Mapping[int, Skin] | None = None,
-    camera: Camera | None = None,
+    camera: Camera | None = None, feathers: tuple[FeatherMesh, ...] = (),
 ) -> None:
     """Draw the document's meshes and coats into a PNG, at rest or in the pose of `skins`, from a side or a camera."""
     from viewport.document_scene import scene_of  # GL is loaded only when a picture is asked for
@@ -112,7 +114,12 @@ def draw(
     shown = posed_document(document, None, evaluator) if skins is None else skins
     first = next(iter(shown.values()), None)
     direction = VIEWS[view] if first is None else turned_view(VIEWS[view], first)
-    _picture(path, scene_of(document, shown, children), size, direction, camera)
+    scene = scene_of(document, shown, children)
+    if feathers:  # skin between them is as dark as what lies under feathers
+        red, green, blue = (UNDER * float(np.mean([mesh.colors[:, k].mean() for mesh in feathers])) for k in range(3))
+        scene = scene._replace(
+            feathers=feathers, surfaces=tuple(s._replace(color=(red, green, blue)) for s in scene.surfaces))
+    _picture(path, scene, size, direction, camera)
 
 
 def turned_view(view: tuple[float, float, float], skin: Skin) -> tuple[float, float, float]:

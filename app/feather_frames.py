@@ -1,15 +1,20 @@
-"""Frames of feathers on their way out: what one frame writes, and what still crosses in it."""
+"""Frames of feathers on their way out: what one frame writes or shows, and what still crosses in it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import typer
 
+from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
 from core.feather.coat.export import instances, left_crossing, shown_rows
-from core.feather.coat.plumage import Laid
+from core.feather.coat.picture import coat_meshes
+from core.feather.coat.plumage import Laid, Plumage
+from core.feather.pieces import FeatherMesh
 from core.formats.usd_feathers import FeatherFrame
+from core.mesh.skin import Skin
 
 Figures = dict[str, Any]
 EXPORTED = ("age", "spacing", "tract")  # columns every program gets beside places and ids
@@ -69,3 +74,17 @@ def export_frame(
         "feathers": len(rows), "crossings": len(left.first), "skin_hits": len(left.skin), "pairs": left.pairs,
         **figures, "worst": worst[:LISTED],
     }
+
+
+def feather_meshes(
+    document: Document, skins: Mapping[int, Skin], frame: float, evaluator: Evaluator
+) -> tuple[FeatherMesh, ...]:
+    """Every coat of feathers that is not hidden, on its skin (by the id of the mesh), as it is drawn at a frame."""
+    found: list[FeatherMesh] = []
+    for coat in document.feathers:
+        item = find_mesh(document, coat.mesh_id)
+        if not coat.hidden and not item.hidden:
+            laid = Plumage(evaluator).at_frame(
+                coat, keys_of(document, coat), item.mesh, skins[item.id], frame, float(document.first_frame))
+            found += coat_meshes(laid, coat)
+    return tuple(found)

@@ -22,6 +22,7 @@ from app.deliver import (
     posed_document,
     saved_view,
 )
+from app.feather_frames import feather_meshes
 from core.document import Document, MeshObject, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
@@ -126,8 +127,10 @@ def draw_file(
     children = {
         g.id: grow(g, skins[g.mesh_id].mesh, evaluator, skin=skins[g.mesh_id], frame=now)
         for g in visible_grooms(document)
+        if g.coat.count  # the keys of feathers grow no hair
     }
-    draw(png, document, children, evaluator, size, view, skins=skins, camera=camera)
+    feathers = feather_meshes(document, skins, now, evaluator)
+    draw(png, document, children, evaluator, size, view, skins, camera, feathers)
 
 
 def _rig_beside_hair(path: Path) -> dict[str, Any]:

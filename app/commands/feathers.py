@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from app.deliver import posed_document
+from app.deliver import draw, posed_document
 from app.feather_frames import MATERIAL, Figures, export_frame, frame_range, worse
 from app.report import Report, peak_megabytes
 from core.document import Document, MeshObject, with_feathers, with_groom
@@ -16,6 +16,7 @@ from core.errors import UserError
 from core.evaluator import Evaluator
 from core.feather.coat.coat import PLACEMENTS
 from core.feather.coat.dress import KEYS, Dressed, dress_feathers
+from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Laid, Plumage
 from core.formats import rig_file
 from core.formats.atomic import atomic_write
@@ -31,7 +32,7 @@ CHOICES = tuple(kind for kind in PLACEMENTS if kind not in ("hand", "field"))  #
 
 def command(
     mesh: Annotated[Path, typer.Argument(help="The bird: OBJ, PLY, STL, OFF, GLB/glTF, USD, Alembic.", show_default=False)],
-    output: Annotated[list[Path], typer.Option("--output", "-o", help="Where the coat goes: .filo .usdc .usda .usd. May be given again.", show_default=False)],
+    output: Annotated[list[Path], typer.Option("--output", "-o", help="Where the coat goes: .filo .usdc .usda .usd, or .png for a picture. May be given again.", show_default=False)],
     count: Annotated[int, typer.Option(min=0, max=2_000_000, help="Feathers, exactly.")] = 10_000,
     preset: Annotated[str, typer.Option(help="The bird the feathers are of.")] = "goldfinch",
     placement: Annotated[str, typer.Option(help=f"How feathers are set: {', '.join(CHOICES)}.")] = "rows",
@@ -76,7 +77,7 @@ def command(
 
 
 def _check(outputs: list[Path]) -> None:
-    known = (".filo", *SUFFIXES)
+    known = (".filo", ".png", *SUFFIXES)
     for path in outputs:
         if path.suffix.lower() not in known:
             raise UserError(f"{path.name}: feathers are written as {', '.join(known)}; choose one of these suffixes")
@@ -110,6 +111,10 @@ def _written(
         for path in outputs:
             if path.suffix.lower() == ".filo":
                 write_project(path, with_feathers(with_groom(document, dressed.keys), dressed.coat))
+                continue
+            if path.suffix.lower() == ".png":
+                with report.stage("picture", f"drawing {path.name}"):
+                    draw(path, document, {}, evaluator, feathers=coat_meshes(rest, dressed.coat))
                 continue
             temporary = stack.enter_context(atomic_write(path))
             writers.append(FeatherWriter(

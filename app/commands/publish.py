@@ -16,7 +16,9 @@ from app.report import Report
 from core.document import Document, find_mesh, keys_of
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Plumage
+from core.feather.pieces import FeatherMesh
 from core.formats import curve_file
 from core.formats.curve_file import maker
 from core.formats.project import read_project
@@ -71,11 +73,13 @@ def _export(document: Document, folder: Path, picture: bool, report: Report) -> 
         children[groom.id] = grow(groom, mesh, evaluator, frame=document.first_frame)
         path = folder / f"groom_{groom.id}.usdc"
         curve_file.write_groom(path, groom_strands(groom, mesh, children[groom.id]), mesh)
+    feathers: list[FeatherMesh] = []
     for coat in document.feathers:
         if coat.hidden:
             continue
         mesh = find_mesh(document, coat.mesh_id).mesh
         laid = Plumage(evaluator).at_rest(coat, keys_of(document, coat), mesh, float(document.first_frame))
+        feathers += coat_meshes(laid, coat)
         written, figures = export_frame(laid, float(document.first_frame), False, evaluator)
         if figures["crossings"] or figures["skin_hits"]:
             report.note(f"{coat.name}: {figures['crossings']} feathers still cross, {figures['skin_hits']} reach the skin")
@@ -83,6 +87,5 @@ def _export(document: Document, folder: Path, picture: bool, report: Report) -> 
         writer.write(written)
         writer.close()
     if picture and document.meshes:
-        shown = document.replace(grooms=tuple(g for g in document.grooms if g.id in children), feathers=())
-        draw(folder / "picture.png", shown, children, evaluator, PICTURE)
+        draw(folder / "picture.png", document, children, evaluator, PICTURE, feathers=tuple(feathers))
     evaluator.close()

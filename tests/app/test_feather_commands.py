@@ -4,6 +4,7 @@ import json
 import os
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
@@ -44,6 +45,14 @@ def test_a_project_of_feathers_is_baked_and_published(bird, tmp_path, capsys):
     told(capsys, "feathers", bird, "-o", project, "--count", 60, "--keys", 6)
     document = read_project(project).document
     assert document.feathers[0].keys_id == document.grooms[0].id
+    for file, name in ((project, "dressed"), (bird, "bare")):
+        told(capsys, "render", file, "-o", tmp_path / f"{name}.png", "--size", "160x120")
+    dressed, bare = (cv2.imread(str(tmp_path / f"{name}.png")).astype(float) for name in ("dressed", "bare"))
+    there = np.abs(bare - bare[0, 0]).max(axis=2) > 40  # the body before the background
+    yellow = dressed[..., 2] - dressed[..., 0]  # of a goldfinch; the bare body is grey
+    assert there.sum() > 1000
+    assert (yellow[there] > 40).mean() > 0.5
+    assert np.abs(bare[..., 2] - bare[..., 0])[there].max() < 40
     baked = told(capsys, "bake", project, "--frames", "1001-1003", "--processes", 1)
     assert [Path(path).name for path in baked["outputs"]] == [f"bird.feathers.{n}.usdc" for n in (1001, 1002, 1003)]
     first = Usd.Stage.Open(baked["outputs"][0]).ExportToString()

@@ -1,0 +1,85 @@
+"""A laid coat as it is drawn: every vane refined from its coarse grid, in the colours of what its place wears."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from core.feather.coat.coat import FeatherCoat
+from core.feather.coat.plumage import Laid
+from core.feather.coloring import vane_mesh
+from core.feather.pieces import FeatherMesh, Floats, grid_triangles, joined, unit
+from core.feather.presets import load_bird, preset_values
+from core.random import rand
+
+ROWS, COLUMNS = 19, 9  # of a vane as it is drawn: enough for bars and for the curve of an outline
+VARIANTS = 16  # of the colours of one preset; neighbours by id never have the same
+STREAKS = 0.3  # by which barbs differ in brightness
+LOOSE = 0.45  # of the way from shaft to edge, and of the length at the tip: where barbs begin to come loose
+
+
+def coat_meshes(laid: Laid, coat: FeatherCoat) -> tuple[FeatherMesh, ...]:
+    """The feathers shown as triangles in space, metres: one mesh for each preset the parts of the bird wear."""
+    worn = load_bird(coat.preset).feathers
+    names = np.array([worn["body"], *(worn.get(tract.name, worn["body"]) for tract in coat.tracts)])
+    rows = np.flatnonzero(laid.shown)
+    wears = names[laid.bed.tract[rows].astype(np.intp)]
+    return tuple(_worn(laid, rows[wears == name], preset_values(str(name))) for name in np.unique(wears))
+
+
+def _worn(laid: Laid, rows: NDArray[np.intp], values: Floats) -> FeatherMesh:
+    """Feathers of one preset; feathers of a variant share the seed of their pattern."""
+    variant = laid.ids[rows] % VARIANTS
+    return joined([
+        _alike(laid, rows[variant == seed], values, int(seed)) for seed in np.unique(variant)
+    ])
+
+
+def _alike(laid: Laid, rows: NDArray[np.intp], values: Floats, seed: int) -> FeatherMesh:
+    coarse = laid.layered.vanes[rows].astype(np.float64)
+    up, across = _spline(coarse.shape[1], ROWS), _spline(coarse.shape[2], COLUMNS)
+    grid = np.einsum("ar,nrcx,bc->nabx", up, coarse, across, optimize=True)
+    own = np.einsum("ar,rcx,bc->abx", up, laid.feathers.own[rows].mean(axis=0, dtype=np.float64), across)
+    outward = np.gradient(grid, axis=2)
+    outward[:, :, : COLUMNS // 2] *= -1.0
+    along = np.gradient(grid, axis=1)
+    normals = np.cross(np.gradient(grid, axis=2), along)
+    normals *= np.sign(np.einsum("nabx,nx->nab", normals, laid.feathers.frames[rows][:, 2]))[..., None]
+    count, size = len(rows), ROWS * COLUMNS
+    side = np.repeat((np.arange(COLUMNS) >= COLUMNS // 2)[None], ROWS, axis=0).astype(np.intp).reshape(-1)
+    place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(own[:, COLUMNS // 2], axis=0), axis=1))])
+    share = np.abs(np.linspace(-1.0, 1.0, COLUMNS))
+    places = np.stack(np.meshgrid(place / place[-1], share, indexing="ij"), axis=-1).reshape(size, 2)
+    barbs = np.repeat(np.arange(ROWS), COLUMNS)
+    chance = rand(np.arange(count)[:, None] * ROWS + barbs, seed + 90)
+    made = vane_mesh(
+        values, seed, _flat(grid), _flat(unit(normals)), _flat(unit(outward)), _triangles(count),
+        np.tile(side, count), _flat(np.tile(places, (count, 1, 1))),
+        _flat(np.tile(own[None, ..., :2], (count, 1, 1, 1))),
+        (1.0 + STREAKS * (chance - 0.5)).reshape(-1).astype(np.float32), np.tile(barbs, count).astype(np.int32),
+    )
+    return made._replace(opacity=made.opacity * _closed(places, chance))
+
+
+def _closed(places: NDArray[np.float64], chance: NDArray[np.float64]) -> Floats:
+    """How closed vanes are (N * size,): less towards edge and tip, where barbs stand apart, each by its own chance."""
+    towards = np.maximum(places[:, 1], (places[:, 0] - LOOSE) / (1.0 - LOOSE))
+    loose = np.clip((towards - LOOSE) / (1.0 - LOOSE), 0.0, 1.0) ** 1.5
+    return np.asarray(1.0 - loose * (0.55 + 0.45 * chance), np.float32).reshape(-1)
+
+
+def _spline(given: int, wanted: int) -> NDArray[np.float64]:
+    """(wanted, given): what samples at even steps make of values at even steps along a natural cubic."""
+    ends = np.linspace(0.0, 1.0, given)
+    return np.asarray(CubicSpline(ends, np.eye(given), bc_type="natural")(np.linspace(0.0, 1.0, wanted)))
+
+
+def _triangles(count: int) -> NDArray[np.int32]:
+    one = grid_triangles(ROWS, COLUMNS)
+    first = np.arange(count, dtype=np.int64)[:, None, None] * (ROWS * COLUMNS)
+    return np.asarray((one + first).reshape(-1, 3), np.int32)
+
+
+def _flat(values: NDArray[np.float64]) -> Floats:
+    return np.ascontiguousarray(values.reshape(-1, values.shape[-1]), np.float32)
