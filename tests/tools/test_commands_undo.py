@@ -11,8 +11,19 @@ from hypothesis import strategies as st
 from hypothesis.stateful import rule
 
 import core.document
-from core.document import Document, MeshObject, find_groom, free_id, with_groom, with_mesh, without_groom, without_mesh
+from core.document import (
+    Document,
+    MeshObject,
+    find_groom,
+    free_id,
+    with_feathers,
+    with_groom,
+    with_mesh,
+    without_groom,
+    without_mesh,
+)
 from core.evaluator import Evaluator
+from core.feather.coat.coat import FeatherCoat
 from core.groom.commands import COMMANDS, skin_context
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
@@ -105,8 +116,19 @@ def _drop_mesh(document, draw):
     return without_mesh(document, draw(st.sampled_from([m.id for m in document.meshes[1:]])))
 
 
+def _put_feathers(document, draw):
+    coat_id = draw(st.sampled_from([*(c.id for c in document.feathers), free_id(document.feathers)]))
+    keys = draw(st.sampled_from([None, *document.grooms]))
+    mesh_id = document.meshes[0].id if keys is None else keys.mesh_id
+    coat = FeatherCoat(
+        id=coat_id, name="down", mesh_id=mesh_id, keys_id=None if keys is None else keys.id,
+        overlap=draw(st.floats(1.0, 8.0)))
+    return with_feathers(document, coat)
+
+
 DOCUMENT_COMMANDS = {
     "with_groom": _put_groom, "with_mesh": _put_mesh, "without_groom": _drop_groom, "without_mesh": _drop_mesh,
+    "with_feathers": _put_feathers,
 }  # fmt: skip
 
 

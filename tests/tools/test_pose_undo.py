@@ -93,6 +93,13 @@ class Some:
         return self.of("+X", "-X")
 
     @property
+    def key(self):
+        """A frame of the clip, one that has a key where there is any."""
+        clip = self.item.rig.clip
+        frames = () if clip is None else tuple(float(clip.start + key) for key in clip.keys)
+        return self.of(1010.0, *frames)
+
+    @property
     def surface(self):
         push = self.draw(st.tuples(*[st.floats(-0.05, 0.05)] * 3))
         part = strip().points[:, :1] * self.of(1.0, -1.0) > self.of(-2.0, 0.0, 0.4)
@@ -139,6 +146,9 @@ ARGUMENTS = {
     "limit_joint": lambda s: (s.joint, (-0.3, -0.3, s.of(-0.3, 9.0)), (0.3, 0.3, 0.3)),
     "constrain_joint": lambda s: (s.joint, s.joint, s.of("aim", "point", "orient"), s.number(0, 1)),
     "free_joints": lambda s: ((s.joint,),),
+    "delete_pose_keys": lambda s: ((s.key,),), "move_pose_keys": lambda s: ((s.key,), s.of(0.0, 3.0, -2.0)),
+    "edit_constraint": lambda s: (s.of(0, 5), s.of({"weight": 0.25}, {"weight": -1.0}, {"nothing": 1})),
+    "remove_constraint": lambda s: (s.of(0, 5),),
 }
 
 

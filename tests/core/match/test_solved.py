@@ -13,14 +13,19 @@ from core.match.solved import Advice, SolvedCamera, SolveSettings, frozen
 from tests.core.match.solve.shots import FOCAL, SIZE, shot
 
 
-def test_a_solved_camera_is_saved_and_opened_again(tmp_path):
-    solved = SolvedCamera(
+def small_solve() -> SolvedCamera:
+    """A camera of plate 1 on two frames, with the point of one track."""
+    return SolvedCamera(
         id=1, plate_id=1, size=(64, 48), kind="free", lens=frozen([4.0, 0.1, 0, 0, 31.5, 23.5]),
         frames=frozen([1, 2], np.int32), rotation=frozen([np.eye(3)] * 2), translation=frozen(np.zeros((2, 3))),
         focal=frozen([50.0, 50.0]), points=frozen([[0.0, 0, 5]]), track_ids=frozen([3], np.int32), errors=frozen([0.2]),
         by_frame=frozen([0.2, 0.3]), rms=0.25, median=0.2, p95=0.3, focal_sigma=1.0, warnings=("it is small",),
         advice=(Advice(words="look", frame=2),), cubes=(3,), settings=SolveSettings(lens="brown"),
     )
+
+
+def test_a_solved_camera_is_saved_and_opened_again(tmp_path):
+    solved = small_solve()
     plate = Plate(id=1, name="p", path="p.####.png", first=1, last=2, width=64, height=48)
     write_project(tmp_path / "a.filo", Document(plates=(plate,), solves=(solved,)))
     (back,) = read_project(tmp_path / "a.filo").document.solves

@@ -23,6 +23,7 @@ from core.image.plate_view import view_points
 from core.match.outline import Mask
 from core.match.track import carried_points, keyed_track
 from core.record import freeze
+from tests.core.match.test_solved import small_solve
 from tests.window.conftest import Opened
 from tests.window.hand import LEFT, NONE, Hand
 from tests.window.host import Host
@@ -109,7 +110,9 @@ def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Ho
     document = edits.put_tracks(edits.add_plate(host.desk.document, film), tracks)
     shape = freeze(np.array([[[5.0, 5.0], [50.0, 5.0], [5.0, 50.0]]]))
     mask = Mask(id=1, name="m", frames=freeze(np.array([11], np.int32)), points=shape, plate_id=1)
-    document = document.replace(masks=(mask,), plates=(*document.plates, film.replace(id=2, hidden=True)))
+    solved = small_solve().replace(size=(200, 100), track_ids=freeze(np.array([2], np.int32)), cubes=())
+    document = document.replace(
+        masks=(mask,), plates=(*document.plates, film.replace(id=2, hidden=True)), solves=(solved,))
     host.desk.session.commit("Tracks", edits.select_tracks(document, (1, 2)))
     host.desk.set_workspace(frame=15.0)
     if command.name in BEFORE:

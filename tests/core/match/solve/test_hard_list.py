@@ -70,7 +70,11 @@ def test_a_dolly_zoom_declared_fixed_is_solved_with_a_zoom_and_that_is_said():
     found, told = _solved(made)
     assert turn_error(found.state, made.truth, found.known) < 0.06
     assert path_error(found.state, made.truth, found.known) < 0.02
-    np.testing.assert_allclose(told.focal_px, FOCAL * np.exp(made.truth.focal), rtol=0.01)
+    # how the focal length changes; one factor on all frames is a freedom that such tracks leave: adjusting from the
+    # truth itself walks along it
+    course = told.focal_px / (FOCAL * np.exp(made.truth.focal))
+    np.testing.assert_allclose(course / course[0], 1.0, rtol=0.01)
+    np.testing.assert_allclose(course, 1.0, rtol=0.05)
     assert any("focal length changes" in words for words in told.warnings)
 
 
