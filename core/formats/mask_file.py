@@ -9,9 +9,8 @@ import msgspec
 import numpy as np
 
 from core.errors import UserError
+from core.formats.given_file import decoded_json
 from core.match.outline import Mask
-
-LARGEST_FILE = 1 << 28
 
 
 class _Mask(msgspec.Struct):
@@ -33,14 +32,7 @@ def read_masks(path: Path) -> tuple[Mask, ...]:
     UserError
         The file is not of this form; the message says what is wrong.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise UserError(f"{path.name} is larger than a file of masks may be.")
-        file = msgspec.json.decode(path.read_bytes(), type=_File)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UserError(f"{path.name} is no file of masks: {error}.") from None
-    except OSError as error:
-        raise UserError(f"{path.name} could not be read ({error.strerror}).") from None
+    file = decoded_json(path, _File, "a file of masks")
     made = []
     for number, one in enumerate(file.masks, 1):
         keys = sorted(one.keys, key=lambda key: key[0])

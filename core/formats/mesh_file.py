@@ -12,6 +12,7 @@ from core.errors import UserError
 from core.formats import alembic_mesh, gltf, obj, off, ply, stl, usd_mesh
 from core.formats.atomic import atomic_write
 from core.formats.file_space import axis_of, metres_of
+from core.formats.given_file import must_be_readable
 from core.formats.mesh_pieces import unpack
 from core.formats.sandbox import run_bounded
 from core.mesh.mesh import Mesh
@@ -111,7 +112,7 @@ def read_mesh(
     """
     path = Path(path)
     how = _format_of(path)
-    _must_be_readable(path)
+    must_be_readable(path, "mesh", LARGEST_FILE)
     metres_given = None if unit is None else metres_of(unit)
     up_given = None if up is None else axis_of(up)
     try:
@@ -197,21 +198,6 @@ def _format_of(path: Path) -> Format:
         kind = INSTEAD[suffix]
         raise UserError(f"{path.name} is a {kind} file, which is not read; export the mesh as USD, Alembic or OBJ.")
     raise UserError(f"{path.name} is no mesh format that is known; use {', '.join(READ_SUFFIXES)}.")
-
-
-def _must_be_readable(path: Path) -> None:
-    try:
-        if not path.is_file():
-            raise UserError(f"{path.name} is {'a folder' if path.is_dir() else 'not there'}; give the name of a file.")
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            file.read(1)
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path.name[:80]} cannot be opened ({getattr(error, 'strerror', None) or error}).") from None
-    if not size:
-        raise UserError(f"{path.name} is empty; export it again.")
-    if size > LARGEST_FILE:
-        raise UserError(f"{path.name} is larger than {LARGEST_FILE >> 30} GB; export a smaller mesh.")
 
 
 def _read(

@@ -19,6 +19,7 @@ from pathlib import Path
 import msgspec
 
 from core.errors import UserError
+from core.formats.given_file import decoded_json
 from core.match.photomodel.records import (
     Known,
     ModelCircle,
@@ -30,8 +31,6 @@ from core.match.photomodel.records import (
     WorldFrame,
     picked,
 )
-
-LARGEST_FILE = 1 << 28
 
 Spot = tuple[str, float, float]
 
@@ -116,7 +115,7 @@ def read_picks(path: Path, sizes: Mapping[Path, tuple[int, int]] | None = None) 
     UserError
         The file is not of this form, or names what is not in it; the message says where.
     """
-    file = _decoded(path)
+    file = decoded_json(path, _File, "a model of photographs")
     sizes = sizes or {}
     photos: list[Photo] = []
     paths: dict[int, Path] = {}
@@ -141,18 +140,8 @@ def read_picks(path: Path, sizes: Mapping[Path, tuple[int, int]] | None = None) 
 
 def photographs_of(path: Path) -> list[Path]:
     """The files of the photographs a model names, so that their sizes can be looked up."""
-    return [path.parent / one.path for one in _decoded(path).photographs if one.path is not None]
-
-
-def _decoded(path: Path) -> _File:
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise UserError(f"{path.name} is larger than {LARGEST_FILE >> 20} MB.")
-        return msgspec.json.decode(path.read_bytes(), type=_File)
-    except OSError as error:
-        raise UserError(f"{path} cannot be opened ({error.strerror}).") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UserError(f"{path.name} is no model of photographs: {error}.") from None
+    file = decoded_json(path, _File, "a model of photographs")
+    return [path.parent / one.path for one in file.photographs if one.path is not None]
 
 
 def _model(name: str, file: _File, photos: list[Photo]) -> Photomodel:

@@ -15,9 +15,9 @@ import msgspec
 import numpy as np
 
 from core.errors import UserError
+from core.formats.given_file import decoded_json
 from core.match.track import PlaneTrack, carried_points, drawn_plane
 
-LARGEST_FILE = 1 << 28
 MOST_POINTS = 10_000
 
 
@@ -40,14 +40,7 @@ def read_planes(path: Path) -> tuple[PlaneTrack, ...]:
     UserError
         The file is not of this form; the message says what is wrong.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise UserError(f"{path.name} is larger than a file of planes may be.")
-        file = msgspec.json.decode(path.read_bytes(), type=_File)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UserError(f"{path.name} is no file of planes: {error}.") from None
-    except OSError as error:
-        raise UserError(f"{path.name} could not be read ({error.strerror}).") from None
+    file = decoded_json(path, _File, "a file of planes")
     made = []
     for number, one in enumerate(file.planes, 1):
         name = "".join(c for c in one.name if c.isprintable())[:255] or f"plane{number}"

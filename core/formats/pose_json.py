@@ -21,13 +21,14 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.formats.given_file import decoded_json
 from core.formats.mesh_file import READ_SUFFIXES, read_mesh
 from core.formats.sculpt_topology import check_topology
 from core.formats.text_numbers import text_bytes
@@ -128,7 +129,7 @@ def read_poses(path: Path, rig: Rig, mesh: Mesh | None = None) -> PoseFile:
     UserError
         Naming the file, the pose, and the control, file or number that is wrong.
     """
-    said = _decoded(path, _Poses)
+    said = decoded_json(path, _Poses, "a list of poses", LARGEST_JSON)
     names = [pose.name for pose in said.poses]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -181,7 +182,7 @@ def read_moment(path: Path, rig: Rig) -> Moment:
     UserError
         Naming the file and what is wrong.
     """
-    said = _decoded(path, _Moment)
+    said = decoded_json(path, _Moment, "a pose", LARGEST_JSON)
     if said.clip is not None:
         if said.controls is not None or said.frame is None:
             raise UserError(f'{path.name} must say either "controls", or "clip" and "frame".')
@@ -330,17 +331,3 @@ def _check_control(name: str, rig: Rig, where: str) -> None:
     known = control_names(rig)
     if name not in known:
         raise UserError(f"{where}: there is no control {name!r}; choose one of {', '.join(known[:20])}.")
-
-
-_T = TypeVar("_T")
-
-
-def _decoded(path: Path, kind: type[_T]) -> _T:
-    try:
-        if path.stat().st_size > LARGEST_JSON:
-            raise UserError(f"{path.name} is too large for a list of poses.")
-        return msgspec.json.decode(path.read_bytes(), type=kind)
-    except OSError as error:
-        raise UserError(f"{path.name} cannot be opened ({error.strerror or error}).") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UserError(f"{path.name} cannot be read: {str(error).rstrip('.')}.") from None

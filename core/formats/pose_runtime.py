@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from core.document import MeshObject
 from core.errors import UserError
 from core.formats.atomic import atomic_write
+from core.formats.given_file import decoded_json
 from core.pose.blend_shapes import BlendShapes
 from core.pose.pose_space import Kernel
 from core.pose.rig import Rig
@@ -147,14 +148,7 @@ def read_runtime(path: Path) -> Runtime:
     UserError
         When one of the two files is missing, damaged, of a newer version, or they do not belong together.
     """
-    try:
-        if path.stat().st_size > LARGEST_JSON:
-            raise UserError(f"{path.name} is too large for a runtime file.")
-        head = msgspec.json.decode(path.read_bytes(), type=RuntimeHead)
-    except OSError as error:
-        raise UserError(f"{path.name} cannot be opened ({error.strerror or error}).") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UserError(f"{path.name} cannot be read: {str(error).rstrip('.')}.") from None
+    head = decoded_json(path, RuntimeHead, "a runtime file", LARGEST_JSON)
     if head.version != VERSION:
         raise UserError(f"{path.name} is of version {head.version}, this program reads {VERSION}; write it again.")
     if Path(head.arrays).name != head.arrays or not head.arrays.endswith(".npz"):

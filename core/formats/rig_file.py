@@ -12,6 +12,7 @@ from core.document import Document, MeshObject
 from core.errors import UserError
 from core.formats import bvh, gltf_rig, tgf
 from core.formats.file_space import axis_of, metres_of
+from core.formats.given_file import must_be_readable
 from core.formats.rig_assembly import RigFile, assemble
 from core.formats.rig_parts import RawRig, unpack_rig
 from core.formats.sandbox import run_bounded
@@ -53,7 +54,7 @@ def read_rig(
         One sentence: an unknown format, a file that is missing or damaged, a rig that contradicts itself.
     """
     path = Path(path)
-    _must_be_readable(path)
+    _must_be_a_rig(path)
     metres_given = None if unit is None else metres_of(unit)
     up_given = None if up is None else axis_of(up)
     try:
@@ -109,23 +110,12 @@ def rig_info(found: RigFile) -> dict[str, Any]:
     }
 
 
-def _must_be_readable(path: Path) -> None:
+def _must_be_a_rig(path: Path) -> None:
     if path.suffix.lower() == ".fbx":
         raise UserError(f"{path.name} is an FBX file, which is not read; export the rig as USD or glTF.")
     if path.suffix.lower() not in READ_SUFFIXES:
         raise UserError(f"{path.name} is no rig format that is known; use {', '.join(READ_SUFFIXES)}.")
-    try:
-        if not path.is_file():
-            raise UserError(f"{path.name} is {'a folder' if path.is_dir() else 'not there'}; give the name of a file.")
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            file.read(1)
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path.name[:80]} cannot be opened ({getattr(error, 'strerror', None) or error}).") from None
-    if not size:
-        raise UserError(f"{path.name} is empty; export it again.")
-    if size > LARGEST_FILE:
-        raise UserError(f"{path.name} is larger than {LARGEST_FILE >> 30} GB; export a smaller rig.")
+    must_be_readable(path, "rig", LARGEST_FILE)
 
 
 def _read(path: Path, sandboxed: bool, cancel: Callable[[], bool] | None) -> RawRig:

@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 
 from core.errors import UserError
+from core.formats.given_file import decoded_json
 from core.match.track import HAND, Track, keyed_track
 from core.record import freeze
 
@@ -53,10 +54,7 @@ def read_tracks_json(path: Path) -> Tracks:
     UserError
         The file is not of this form; the message says where.
     """
-    try:
-        file = msgspec.json.decode(path.read_bytes(), type=_File)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UserError(f"{path.name} is no file of tracks: {error}.") from None
+    file = decoded_json(path, _File, "a file of tracks", LARGEST_FILE)
     if len(file.tracks) > MOST_TRACKS:
         raise UserError(f"{path.name} holds more than {MOST_TRACKS:,} tracks.")
     if file.size is not None and min(file.size) < 1:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from core.errors import UserError
+from core.formats.usd_stage import open_stage
 
 MOST = 10_000
 
@@ -18,15 +17,9 @@ def read_in_child(path: str, frame: float) -> dict[str, Any]:
     `names` paths, `world` (N, 4, 4) world_from_camera for column vectors, `lens` (N, 6): orthographic (0 or 1), half
     width and half height (tangents, or units of the stage), near, far, shift of the picture.
     """
-    from pxr import Gf, Tf, Usd, UsdGeom
+    from pxr import Gf, Usd, UsdGeom
 
-    name = Path(path).name
-    try:
-        stage = Usd.Stage.Open(path)
-    except Tf.ErrorException:
-        stage = None
-    if stage is None:
-        raise UserError(f"{name} is not a USD file that can be read; export it again.")
+    stage = open_stage(path)
     names: list[str] = []
     world, lens = [], []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):

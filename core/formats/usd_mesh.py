@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.formats.mesh_pieces import pack, unique_names
+from core.formats.usd_stage import define_mesh, open_stage
 from core.mesh.edges import reversed_corners
 from core.mesh.mesh import Mesh
 from core.mesh.polygons import Polygons
@@ -24,15 +25,10 @@ def read_in_child(path: str) -> dict[str, Any]:
 
     Instances are followed. Proxies, guides and invisible meshes are read only where there is nothing else.
     """
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Usd, UsdGeom
 
     name = Path(path).name
-    try:
-        stage = Usd.Stage.Open(path)
-    except Tf.ErrorException:
-        stage = None
-    if stage is None:
-        raise UserError(f"{name} is not a USD file that can be read; export it again.")
+    stage = open_stage(path)
     time = Usd.TimeCode.EarliestTime()
     transforms = UsdGeom.XformCache(time)
     shown: list[Polygons] = []
@@ -80,19 +76,7 @@ def write_usd(path: Path, mesh: Mesh) -> None:
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
     stage.SetDefaultPrim(root)
     name = mesh.part_names[0] if len(mesh.part_names) == 1 else "mesh"
-    made = UsdGeom.Mesh.Define(stage, f"/Model/{Tf.MakeValidIdentifier(name)}")
-    made.GetPrim().SetDisplayName(name)
-    made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(mesh.points))
-    made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(mesh.counts))
-    made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.corners))
-    if len(mesh.points):
-        made.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([mesh.points.min(0), mesh.points.max(0)])))
-    if mesh.uvs is not None:
-        st = UsdGeom.PrimvarsAPI(made).CreatePrimvar(
-            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
-        )
-        st.Set(Vt.Vec2fArray.FromNumpy(mesh.uvs))
+    made = define_mesh(stage, f"/Model/{Tf.MakeValidIdentifier(name)}", name, mesh)
     if len(mesh.part_names) > 1:
         for part, name in enumerate(mesh.part_names):
             rows = Vt.IntArray.FromNumpy(np.flatnonzero(mesh.parts == part).astype(np.int32))

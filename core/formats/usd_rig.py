@@ -5,7 +5,6 @@ Every SkelAnimation of the stage is a clip, frames are time codes. A mesh lies w
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from core.formats.rig_parts import (
     rest_from_bind,
 )
 from core.formats.usd_mesh import mesh_piece
+from core.formats.usd_stage import open_stage
 from core.pose.clip import check_frames, split_matrices
 
 Array = NDArray[np.float64]
@@ -56,15 +56,9 @@ class _Skel(NamedTuple):
 
 def read_in_child(path: str) -> dict[str, Any]:
     """Skeletons, skins, blend shapes and clips of the stage, in its units and axes (see ``pack_rig``)."""
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import UsdGeom
 
-    name = Path(path).name
-    try:
-        stage = Usd.Stage.Open(path)
-    except Tf.ErrorException:
-        stage = None
-    if stage is None:
-        raise UserError(f"{name} is not a USD file that can be read; export it again.")
+    stage = open_stage(path)
     said = stage.HasAuthoredMetadata
     notes: list[str] = []
     bound, skels = _bindings(stage, notes)

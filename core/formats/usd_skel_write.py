@@ -19,6 +19,7 @@ from core.document import MeshObject
 from core.errors import UserError
 from core.formats import usd_corrections
 from core.formats.corrective_shapes import CorrectiveShapes, corrective_shapes, shape_weights_at
+from core.formats.usd_stage import define_mesh
 from core.pose.blend_shapes import BlendShapes, dense_offsets, shape_weights
 from core.pose.pose_space import PoseSpace
 from core.pose.rig import Rig, resting_numbers
@@ -100,21 +101,9 @@ def _skeleton(stage: Any, rig: Rig, tokens: list[str]) -> Any:
 
 
 def _mesh(stage: Any, item: MeshObject, rig: Rig, skeleton: Any) -> Any:
-    from pxr import Gf, Sdf, Tf, UsdGeom, UsdSkel, Vt
+    from pxr import Gf, Tf, UsdSkel, Vt
 
-    mesh = item.mesh
-    made = UsdGeom.Mesh.Define(stage, f"/Model/{Tf.MakeValidIdentifier(item.name)}_mesh")
-    made.GetPrim().SetDisplayName(item.name)
-    made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(mesh.points))
-    made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(mesh.counts))
-    made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.corners))
-    if len(mesh.points):
-        made.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([mesh.points.min(0), mesh.points.max(0)])))
-    if mesh.uvs is not None:
-        st = UsdGeom.PrimvarsAPI(made).CreatePrimvar(
-            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
-        st.Set(Vt.Vec2fArray.FromNumpy(mesh.uvs))
+    made = define_mesh(stage, f"/Model/{Tf.MakeValidIdentifier(item.name)}_mesh", item.name, item.mesh)
     binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
     binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))

@@ -14,6 +14,7 @@ import numpy as np
 
 from core.errors import UserError
 from core.formats.sandbox import run_bounded
+from core.formats.usd_stage import open_stage
 from core.match.lens import MODELS, model_of, start_lens
 from core.match.solve.shot import Shot, shot_from_up
 from core.match.solve.state import CENTRE_X, CENTRE_Y
@@ -124,15 +125,10 @@ Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 def read_in_child(path: str) -> dict[str, Any]:
     """`frames` (F,), `world` (F, 4, 4) for column vectors, `film` (F, 5): focal length, apertures, offsets."""
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Usd, UsdGeom
 
     name = Path(path).name
-    try:
-        stage = Usd.Stage.Open(path)
-    except Tf.ErrorException:
-        stage = None
-    if stage is None:
-        raise UserError(f"{name} is not a USD file that can be read; export it again.")
+    stage = open_stage(path)
     cameras = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Camera)]
     if not cameras:
         raise UserError(f"{name} holds no camera.")
