@@ -110,7 +110,7 @@ def test_a_plane_is_followed_as_a_corner_pin(plate, tmp_path):
 
 
 @pytest.mark.parametrize(("text", "word"), [
-    ("{", "no file of planes"),
+    ("{", "not a file of planes"),
     ('{"planes": [{"frame": 1001, "outline": [[1, 2]]}]}', "outline"),
     ('{"planes": [{"frame": 77, "outline": [[1, 2], [30, 2], [1, 40]]}]}', "77"),
     ('{"planes": [{"frame": 1001, "outline": [[1, 2], [1e999, 2], [1, 40]]}]}', "planes"),
