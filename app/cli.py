@@ -17,6 +17,7 @@ from pathlib import Path
 import typer
 
 from core.errors import UserError
+from core.kernel_cache import kernels_compiled, note_compiled
 
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
 COMMANDS = (
@@ -102,10 +103,19 @@ def _run(arguments: list[str]) -> int:
     if _wants_window(arguments):
         arguments = ["window", *arguments]
     chosen = next((a for a in arguments if not a.startswith("-")), None)
-    # one command alone would lose its name, so a second, light one stands beside it
-    cli = overview() if chosen not in COMMANDS else build((chosen, "bench" if chosen == "run" else "run"))
+    cli = overview() if chosen not in COMMANDS else _with(chosen)
     command = typer.main.get_command(cli)
     return command(args=arguments, prog_name="filoplume", standalone_mode=False) or 0
+
+
+def _with(chosen: str) -> typer.Typer:
+    """The application with one command, whose kernels are compiled when it is loaded for the first time."""
+    if chosen != "window" and not kernels_compiled(chosen):  # the window shows how far it is
+        print("filoplume: the first time, this compiles what it needs; that may take a minute.", file=sys.stderr)
+    # one command alone would lose its name, so a second, light one stands beside it
+    cli = build((chosen, "bench" if chosen == "run" else "run"))
+    note_compiled(chosen)
+    return cli
 
 
 def _wants_window(arguments: list[str]) -> bool:

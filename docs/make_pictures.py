@@ -11,7 +11,7 @@ import numpy as np
 
 from app.commands.demo import draw_poses
 from app.deliver import draw
-from app.files import draw_file
+from app.drawing import draw_file
 from core.demo.arm import arm
 from core.demo.arm_sculpts import arm_sculpts
 from core.demo.document import demo_document

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from app.files import troubles
+from app.inspection import troubles
 from app.report import Report
 
 

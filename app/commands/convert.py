@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from app.files import convert
+from app.conversion import convert
 from app.report import Report
 
 

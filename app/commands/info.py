@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from app.files import describe
+from app.inspection import describe
 from app.report import Report
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import SAVED, VIEWS
-from app.files import draw_file
+from app.drawing import draw_file
 from app.report import Report
 from core.errors import UserError
 

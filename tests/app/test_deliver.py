@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.conversion import convert
 from app.deliver import deliver, exported_groom, saved_view
-from app.files import convert
 from core.camera import Camera, look_at, project
 from core.errors import UserError
 from core.formats.project import read_project, write_project

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
-from app.files import describe
+from app.inspection import describe
 from core.errors import UserError
 from core.formats.rig_assembly import NoRig
 from core.formats.rig_file import READ_SUFFIXES, read_rig

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from core.kernel_cache import source_hash
+from core.kernel_cache import kernels_compiled, note_compiled, source_hash
 
 ROOT = Path(__file__).parents[2]
 
@@ -39,3 +39,22 @@ def test_folders_of_old_sources_go_after_a_while(tmp_path):
 
 def test_a_home_that_cannot_be_written_to_does_not_stop_the_start():
     assert cache_of({"XDG_CACHE_HOME": "/proc/nowhere"}) == ""
+
+
+def test_what_was_compiled_is_known_command_by_command(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert not kernels_compiled("groom")
+    note_compiled("groom")
+    assert kernels_compiled("groom")
+    assert not kernels_compiled("pose")
+    assert not kernels_compiled()
+    note_compiled()
+    assert kernels_compiled("pose")
+
+
+def test_without_a_folder_for_kernels_nothing_is_noted(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.chdir(tmp_path)
+    note_compiled("groom")
+    assert not kernels_compiled("groom")
+    assert not list(tmp_path.iterdir())
