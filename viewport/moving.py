@@ -65,6 +65,7 @@ class Moving:
         self._owed: list[NDArray[np.bool_]] = []  # where they are shall be one
         self.opening = False  # more of what is owed is to be done by another picture, changed or not
         self._neighbours: list[Neighbours] = []
+        self._shown_before: list[NDArray[np.integer] | None] = []  # which hairs of every coat the last picture drew
         self._still: list[Coat] = []  # what is drawn of every coat, as it was in the finished picture
         self._guides_moved: list[NDArray[np.bool_]] = []
         self._last_guides: list[GuideLines] = []
@@ -136,6 +137,7 @@ class Moving:
         self.opening = False
         self._neighbours = [Neighbours(coat, drawn, camera) for coat, drawn in self._sparse]
         self._still = [drawn for _, drawn in self._sparse]
+        self._shown_before = [drawn.order for drawn in self._still]
         self._guides_moved = [np.zeros(len(lines.points), bool) for lines in scene.guides]
         self._last_guides = [drawable.lines for drawable in self.renderer.guides]
         self._touched = Touched(picture[0].color.size)
@@ -150,8 +152,10 @@ class Moving:
         assert self.base is not None
         assert patch.target is not None
         for i, (coat, drawn) in enumerate(self._sparse):
+            moving = np.zeros(len(coat.points), bool)  # in this picture; holes of others stay where they are
             for points, rows in self.touched:
                 if points is coat.points:
+                    moving[rows] = True
                     new = rows[~self._moved[i][rows]]
                     self._moved[i][new] = True
                     self._owed[i][self._neighbours[i].around(new)] = True
@@ -164,12 +168,14 @@ class Moving:
             patch.open(renderer.coats[i].textures, new, self.base, matrix)
             self._touched.add(coat.points, new, camera)
             assert drawn.order is not None
-            moved = np.flatnonzero(self._moved[i][drawn.order])
+            if drawn.order is not self._shown_before[i]:  # other hairs are drawn now
+                moving, self._shown_before[i] = self._moved[i], drawn.order
+            moved = np.flatnonzero(moving[drawn.order])
             patch.open(self.coats[i].textures, moved, self.base, matrix)
             self._touched.add(drawn.points, moved, camera)
             still = self._still[i]
             assert still.order is not None
-            self._touched.add(still.points, np.flatnonzero(self._moved[i][still.order]), camera)
+            self._touched.add(still.points, np.flatnonzero(moving[still.order]), camera)
         for i, lines in enumerate(scene.guides):
             rows = [rows for points, rows in self.touched if points is lines.points]
             changed = changed_guides(self._last_guides[i], lines)
@@ -179,7 +185,7 @@ class Moving:
             new = changed & ~self._guides_moved[i]
             self._guides_moved[i] |= changed
             patch.open(renderer.guides[i].textures, near[new[near]], self.base, matrix)
-            moved = np.flatnonzero(self._guides_moved[i][near])
+            moved = np.flatnonzero(changed[near])
             patch.open(self.guides[i].textures, moved, self.base, matrix)
             for strands, rows_touched in ((self._last_guides[i].points, near[new[near]]), (lines.points, near[moved])):
                 self._touched.add(strands, rows_touched, camera)
