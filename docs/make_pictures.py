@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -39,21 +41,10 @@ STYLES = ("short", "fur", "long", "mane")
 def first_groom() -> None:
     """Follow the first groom by hand in the real window; a picture of the window after every step."""
     ensure_display()  # before anything of Qt is made
-    from app.window.screenshot import window_image
     from docs.first_groom import SIZE, STEPS, picture_of
     from docs.manual import written
-    from tests.window.alone import hand_at
-    from tests.window.take_pictures import reduced
 
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
-        hand = hand_at(None, SIZE)
-        for number, step in enumerate(STEPS, 1):
-            step.do(hand, Path(folder))
-            hand.finish()
-            image = reduced(window_image(hand.window), 0.75)
-            cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
-        hand.window.close_unasked()
+    pictures_of_steps(STEPS, SIZE, picture_of)
     manual = PICTURES.parent / "groom.md"
     manual.write_text(written(manual.read_text("utf-8")), "utf-8")
 
@@ -61,26 +52,32 @@ def first_groom() -> None:
 def first_pose() -> None:
     """Follow the first corrective by hand; a picture of the window after every step."""
     ensure_display()  # before anything of Qt is made
-    from app.window.screenshot import window_image
     from docs.first_pose import SIZE, STEPS, chapter, picture_of
-    from tests.window.alone import hand_at
-    from tests.window.take_pictures import reduced
 
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
-        hand = hand_at(None, SIZE)
-        for number, step in enumerate(STEPS, 1):
-            step.do(hand, Path(folder))
-            hand.finish()
-            image = reduced(window_image(hand.window), 0.75)
-            cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
-        hand.window.close_unasked()
+    pictures_of_steps(STEPS, SIZE, picture_of)
     manual = PICTURES.parent / "pose.md"
     before, _, rest = manual.read_text("utf-8").partition(FIRST_POSE[0])
     _, end, after = rest.partition(FIRST_POSE[1])
     if not end:
         raise SystemExit(f"pose.md has no line {FIRST_POSE[1]}: put it after the chapter that is to be made")
     manual.write_text(before + FIRST_POSE[0] + chapter() + FIRST_POSE[1] + after, "utf-8")
+
+
+def pictures_of_steps(steps: Sequence[Any], size: tuple[int, int], picture_of: Callable[[int], str]) -> None:
+    """Do the steps of a chapter of the manual in a window of this size; the picture after each, by its number."""
+    from app.window.screenshot import window_image
+    from tests.window.alone import hand_at
+    from tests.window.take_pictures import reduced
+
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
+        hand = hand_at(None, size)
+        for number, step in enumerate(steps, 1):
+            step.do(hand, Path(folder))
+            hand.finish()
+            image = reduced(window_image(hand.window), 0.75)
+            cv2.imwrite(str(PICTURES / picture_of(number)), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        hand.window.close_unasked()
 
 
 def match_window(plate: Path) -> None:
