@@ -25,7 +25,7 @@ from core.pose.clip import onto_skeleton, resampled
 from core.pose.constraints import constrained
 from core.pose.controls import NOISE, rotation_dof, without_noise
 from core.pose.corrective import as_kind
-from core.pose.layers import space_dofs
+from core.pose.layers import space_dofs, with_rest_falloffs
 from core.pose.mirror_pose import mirror_of_rig, mirrored_space
 from core.pose.pose import Pose
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, Way
@@ -224,8 +224,10 @@ def set_falloff(document: Document, mesh_id: int, name: str, control: str, fallo
     space = _correctives(document, mesh_id).layers[at].space
     own = {c: f for c, f in space.samples[k].falloffs.items() if c != control}
     sample = space.samples[k].replace(falloffs=own if falloff is None else {**own, control: falloff})
-    samples = (*space.samples[:k], sample, *space.samples[k + 1 :])
-    return set_space(document, mesh_id, _correctives(document, mesh_id).layers[at].name, samples=samples)
+    changed = with_rest_falloffs(space.replace(samples=(*space.samples[:k], sample, *space.samples[k + 1 :])))
+    return set_space(
+        document, mesh_id, _correctives(document, mesh_id).layers[at].name, samples=changed.samples,
+        rest_falloffs=changed.rest_falloffs)
 
 
 def set_reading(document: Document, mesh_id: int, layer: str, joint: str, reading: Reading) -> Document:

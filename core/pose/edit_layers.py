@@ -19,6 +19,7 @@ from core.pose.layers import (
     extract_layer,
     sample_of,
     space_dofs,
+    with_rest_falloffs,
 )
 from core.pose.pose import Pose, moved_controls
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
@@ -108,7 +109,8 @@ def add_sculpt(
     targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
     targets[-1] = sculpted[layer.vertices]
     below = [s.pose for lower in layers[:at] for s in lower.space.samples]
-    space = layer.space.replace(anchors=anchors_of(layer.space, below))
+    space = with_rest_falloffs(layer.space)
+    space = space.replace(anchors=anchors_of(space, below))
     layers[at], report = extract_layer(
         points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer,
         (len(space.samples) - 1,))

@@ -92,6 +92,7 @@ def build(
         space = PoseSpace(
             dofs=space_dofs(rig, [s.pose for s in group], controls, dofs),
             samples=tuple(sample_of(s.pose, s.falloffs, controls) for s in group), **options)
+        space = with_rest_falloffs(space)
         space = space.replace(anchors=anchors_of(space, [s.pose for layer in layers for s in layer.space.samples]))
         targets = np.full((len(group), len(points), 3), np.nan)
         for k, sculpt in enumerate(group):
@@ -109,6 +110,22 @@ def build(
 def sample_of(pose: Pose, falloffs: Mapping[str, Falloff], controls: Sequence[str]) -> PoseSample:
     """The sample of a pose in a space over `controls`; falloffs of others, which are at rest there, say nothing."""
     return PoseSample(pose=pose, falloffs={name: reach for name, reach in falloffs.items() if name in controls})
+
+
+def with_rest_falloffs(space: PoseSpace) -> PoseSpace:
+    """The space whose rest and anchors reach as far as its samples do.
+
+    Along each control where every sample has a falloff of its own it is the median of them: poses given one falloff
+    measure alike from wherever, and the system stays symmetric. Elsewhere it is that of the space.
+    """
+    found: dict[str, Falloff] = {}
+    for control in space.controls:
+        said = [s.falloffs[control] for s in space.samples if control in s.falloffs]
+        if said and len(said) == len(space.samples):
+            wide = max(map(len, said))
+            found[control] = tuple(np.median([f if len(f) == wide else f * wide for f in said], axis=0).tolist())
+    changed: PoseSpace = space.replace(rest_falloffs=found)
+    return changed
 
 
 def space_dofs(

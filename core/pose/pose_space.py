@@ -85,7 +85,7 @@ class PoseSpace(Record, kw_only=True):
     dofs : at least one; no two of the same control and kind.
     samples : the sculpted poses, of unique names, none named "rest".
     anchors : poses where the correction is held at nothing, as at rest.
-    rest_falloffs : of the centre at rest, by control.
+    rest_falloffs : of the centres at rest and at anchors, by control.
     """
 
     kernel: Annotated[Kernel, field(

@@ -86,7 +86,7 @@ def solve(
     """
     samples = space.samples if known is None else [s for s, take in zip(space.samples, known, strict=True) if take]
     poses = [REST, *space.anchors, *(s.pose for s in samples)]
-    own = [space.rest_falloffs, *({} for _ in space.anchors), *(s.falloffs for s in samples)]
+    own = [*[space.rest_falloffs] * (1 + len(space.anchors)), *(s.falloffs for s in samples)]
     usual = scales(space.dofs, None, weights)
     each = np.array([scales(space.dofs, o, weights) if o else usual for o in own])
     settings = Settings(

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.interpolate import RBFInterpolator
 
 from core.document import Document, MeshObject
 from core.errors import UserError
@@ -29,6 +30,7 @@ from core.pose.pose_space import Correctives, PoseSpace
 from core.pose.refusal import Refusal
 from core.pose.rig import Control
 from core.pose.skeleton import Clip
+from core.pose.solve import solve, weights
 from core.pose.synthesis import evaluate, prepare
 from core.posed import skin_at
 from core.record import freeze
@@ -335,6 +337,26 @@ def test_a_falloff_of_a_control_that_rests_says_nothing():
     made = build(points, rig, [Sculpt(pose, target, falloffs)]).correctives
     again = add_sculpt(points, rig, Correctives(), pose, target, falloffs).correctives
     assert [c.layers[0].space.samples[0].falloffs for c in (made, again)] == [{"fore": (1.0,)}] * 2
+
+
+def test_poses_of_one_falloff_measure_alike_with_rest_and_anchors_among_them():
+    """SciPy knows one width; rest and the anchors of a space whose poses have one of their own have it as well."""
+    rig, points = arm()
+    reach = {"flex": (0.3,), "mood": (0.3,)}
+    numbers = [{"mood": -0.4}, {"flex": 0.9, "mood": 0.9}, {"flex": 0.4, "mood": -0.6}, {"flex": 0.7, "mood": -0.1}]
+    made = [Sculpt(p, bumped(rig, points, p, k), reach) for k, p in enumerate(turned(f"{n}", n) for n in numbers)]
+    whole = build(points, rig, made, kernel="gaussian").correctives
+    one_by_one = Correctives()
+    for s in made:
+        one_by_one = add_sculpt(points, rig, one_by_one, s.pose, s.target, s.falloffs).correctives
+    for layers in (whole, one_by_one):
+        space = layers.layers[1].space
+        assert [pose.name for pose in space.anchors] == [made[0].pose.name]
+        centres = np.array([[0.0, 0.25], *([n.get("flex", 0.0), n["mood"]] for n in numbers)])
+        truth = RBFInterpolator(centres, np.eye(5)[:, 2:], kernel="gaussian", epsilon=1 / (0.3 * 2**0.5), degree=-1)
+        for flex, mood in ((0.2, 0.1), (0.8, -0.5)):
+            found = weights(solve(space), Pose(numbers={"flex": flex, "mood": mood}))
+            assert np.abs(found - truth([[flex, mood]])[0]).max() <= 1e-10
 
 
 def test_sculpts_are_met_where_a_piece_of_geometry_or_a_joint_is_the_number():
