@@ -20,7 +20,7 @@ from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer
 from core.pose.refusal import Refusal
 from core.pose.rig import Rig
 from core.pose.skinning import skin_matrices_of
-from core.pose.solve import TOO_CLOSE, solve, weights_at
+from core.pose.solve import TOO_CLOSE, refuse_near, solve, weights_at
 from core.pose.synthesis import Prepared, corrected, felt, prepare_layer, run_keys, skin_shares, whole_pose
 from core.record import freeze
 from core.transform import Array
@@ -173,6 +173,7 @@ def extract_layer(
     Refusal
         Naming the poses that cannot be told apart.
     """
+    refuse_near(space)
     solve(space)
     least = UNMOVED * diagonal(points)
     poses, count = [s.pose for s in space.samples], len(space.samples)

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from core.pose.embedding import WIDTHS, embed, scales
 from core.pose.kernels import AFFINE, POSITIVE, inverse_squares, kernel
 from core.pose.pose import REST, Pose
-from core.pose.pose_space import Dof, PoseSpace
+from core.pose.pose_space import Dof, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
 from core.transform import Array
 
 LEAST_CONDITION = 1e-12  # smallest over largest singular value below which a system counts as singular
 DOUBTFUL = 1e-10  # the same by a quick lower bound, above which nobody looks closer
-TOO_CLOSE = 1e-6  # falloffs between two poses that are one pose by mistake
+TOO_CLOSE = 1e-6  # falloffs between two poses that no system tells apart
+NEAREST = 1e-3  # the same of poses made by hand: nearer ones, and weights beside them run up to many hundreds
 MOST_LOSS = 1e-6  # by which rounding may miss a weight at its own pose
 
 
@@ -86,14 +87,25 @@ def solve(
     """
     samples = space.samples if known is None else [s for s, take in zip(space.samples, known, strict=True) if take]
     poses = [REST, *space.anchors, *(s.pose for s in samples)]
-    own = [*[space.rest_falloffs] * (1 + len(space.anchors)), *(s.falloffs for s in samples)]
     usual = scales(space.dofs, None, weights)
-    each = np.array([scales(space.dofs, o, weights) if o else usual for o in own])
     settings = Settings(
         space.kernel, space.normalise, space.affine, space.clamp, space.smoothing, space.table)
     return solve_centres(
-        embed(space.dofs, poses), each, usual, settings, tuple(p.name for p in poses), space.dofs,
-        1 + len(space.anchors))
+        embed(space.dofs, poses), _scales_of_each(space, samples, usual, weights), usual, settings,
+        tuple(p.name for p in poses), space.dofs, 1 + len(space.anchors))
+
+
+def refuse_near(space: PoseSpace) -> None:
+    """Refusal naming poses that are so near each other that somebody made one of them by mistake.
+
+    Asked when poses are made; a space that has such poses from elsewhere can still be solved.
+    """
+    poses = [REST, *space.anchors, *(s.pose for s in space.samples)]
+    places, each = embed(space.dofs, poses), _scales_of_each(space, space.samples, scales(space.dofs))
+    squared = _squared_distances(places, places, each)
+    silent = 1 + len(space.anchors)
+    squared[:silent, :silent] = np.inf  # their weights multiply nothing
+    _refuse_twins(squared, tuple(p.name for p in poses), NEAREST)
 
 
 def solve_centres(
@@ -103,7 +115,7 @@ def solve_centres(
     """Solve for centres (C, D) given as coordinates, with the scales (C, D) of each and the usual ones (D,)."""
     count = len(centres)
     squared = _squared_distances(centres, centres, each)
-    _refuse_twins(squared, names)
+    _refuse_twins(squared, names, TOO_CLOSE)
     if settings.kernel == "shepard" or count == 1:  # of one centre the weight is 1 everywhere
         exact = np.zeros(count)
         return Solved(dofs, settings, names, silent, centres, each, None, None, 1.0, exact)
@@ -148,6 +160,14 @@ def weights_at(solved: Solved, places: Array) -> Array:
         # of the sizes: the plain sum passes through 0 where some weights are negative
         found = found / np.maximum(np.abs(found).sum(axis=1, keepdims=True), 1e-300)
     return found
+
+
+def _scales_of_each(
+    space: PoseSpace, samples: Sequence[PoseSample], usual: Array, weights: NDArray[np.float64] | None = None
+) -> Array:
+    """The scales (C, D) of all centres: rest, anchors, samples."""
+    own = [*[space.rest_falloffs] * (1 + len(space.anchors)), *(s.falloffs for s in samples)]
+    return np.array([scales(space.dofs, o, weights) if o else usual for o in own])
 
 
 def _squared_distances(places: Array, centres: Array, each: Array) -> Array:
@@ -222,9 +242,9 @@ def _weakest(system: Array, names: tuple[str, ...]) -> tuple[float, Array]:
     return (float(sizes[-1] / sizes[0]) if sizes[0] > 0.0 else 0.0), share
 
 
-def _refuse_twins(squared: Array, names: tuple[str, ...]) -> None:
+def _refuse_twins(squared: Array, names: tuple[str, ...], closest: float) -> None:
     # the larger of both distances: a pose of endless falloff has everything near
-    near = np.maximum(squared, squared.T) < TOO_CLOSE**2
+    near = np.maximum(squared, squared.T) < closest**2
     np.fill_diagonal(near, False)
     guilty = near.any(axis=1)
     if guilty.any():

@@ -257,13 +257,13 @@ def test_a_pose_nearer_than_rounding_goes_on_with_the_sculpt_there():
     assert names(s) == ["left"]
 
 
-def test_poses_hardly_apart_are_refused_as_singular_and_the_offers_mend_it():
+def test_a_sculpt_hardly_apart_from_another_is_refused_and_the_offers_mend_it():
     for offer, left in (("merge", ["left"]), ("delete", ["near"])):
-        s = session(pose=turned("held", arm_L=(0, 40.0003, 30)))
+        s = session(pose=turned("held", arm_L=(0, 40.01, 30)))
         sculpted(s, LEFT)
         with pytest.raises(Refusal) as refused:
             s.act("add_sculpt", name="near")
-        assert (refused.value.reason, set(refused.value.poses)) == ("singular", {"left", "near"})
+        assert (refused.value.reason, set(refused.value.poses)) == ("near-duplicate", {"left", "near"})
         act(s, "add_sculpt", name="near", twins=offer)
         assert names(s) == left
 

@@ -211,6 +211,21 @@ def test_deleting_merging_and_moving_mend_a_refusal():
         merged_poses(apart, ["twin"])
 
 
+@pytest.mark.parametrize(("degrees", "reason"), [(0, "duplicate"), (1e-3, "near-duplicate"), (0.05, "near-duplicate")])
+def test_poses_a_hand_made_twice_are_refused(degrees, reason):
+    """A thousandth of a falloff apart, sculpts a millimetre apart would throw the surface by a metre beside them."""
+    rig, points = arm(200)
+    made = sculpts(rig, points)[:3]
+    near = Sculpt(turned("near", fore=(0, 0, 90 + degrees)), made[0].target)
+    with pytest.raises(Refusal) as refused:
+        build(points, rig, [*made, near])
+    assert (refused.value.reason, refused.value.poses) == (reason, ("elbow 90", "near"))
+    found = build(points, rig, made).correctives
+    with pytest.raises(Refusal, match="'elbow 90' and 'near'"):
+        add_sculpt(points, rig, found, near.pose, near.target)
+    build(points, rig, [*made, Sculpt(turned("near", fore=(0, 0, 90.1)), made[0].target)])
+
+
 def test_a_pose_at_rest_is_refused():
     rig, points = arm(50)
     with pytest.raises(Refusal) as refused:
