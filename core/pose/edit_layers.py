@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.leaves import same_bits
 from core.pose.controls import rests
 from core.pose.layers import (
     UNMOVED,
@@ -24,6 +25,7 @@ from core.pose.layers import (
 from core.pose.pose import Pose, moved_controls
 from core.pose.pose_space import REST_NAME, Correctives, Dof, Falloff, PoseLayer, PoseSample, PoseSpace
 from core.pose.refusal import Refusal
+from core.pose.resculpt import sculpted_again
 from core.pose.rig import Rig
 from core.pose.synthesis import Prepared, evaluate, prepare, prepare_layer, run_weights, whole_pose
 from core.record import freeze
@@ -73,7 +75,7 @@ def add_sculpt(
     points: NDArray[np.float32], rig: Rig, correctives: Correctives, pose: Pose, target: NDArray[Any],
     falloffs: Mapping[str, Falloff] | None = None, dofs: Sequence[Dof] | None = None, **options: Any,
 ) -> Extracted:
-    """Correctives with one more sculpt (or a sculpt anew, when its pose has the name of one).
+    """Correctives with one more sculpt (or a sculpt anew, when its pose has the name of one; it keeps its falloffs).
 
     It joins the space that moves the same controls; else a new space begins, below those that move more controls
     beside these. Only vertices it moves become its own. Later layers are extracted again, their sculpts
@@ -89,8 +91,11 @@ def add_sculpt(
     if not controls:
         raise Refusal("duplicate", (REST_NAME, pose.name))
     kept = correctives
-    if find_pose(correctives, pose.name) is not None:
-        correctives = without_pose(correctives, pose.name)
+    had = find_pose(correctives, pose.name)
+    if had is not None and correctives.layers[had[0]].space.controls != controls:
+        correctives, had = without_pose(correctives, pose.name), None
+    if had is not None and falloffs is None:
+        falloffs = correctives.layers[had[0]].space.samples[had[1]].falloffs
     sample = sample_of(pose, falloffs or {}, controls)
     layers = list(correctives.layers)
     at = next((i for i, layer in enumerate(layers) if layer.space.controls == controls), None)
@@ -99,25 +104,40 @@ def add_sculpt(
         at = next(above, len(layers))
         space = PoseSpace(dofs=space_dofs(rig, [pose], controls, dofs), samples=(sample,), **options)
         layers.insert(at, _layer(_free_name(layers, controls), space, np.zeros(0, np.int32)))
-        layer = layers[at]
+        k = 0
     else:
-        layer = layers[at]
-        layer = _resampled(layer, (*layer.space.samples, sample), [*range(len(layer.space.samples)), None])
+        k = len(layers[at].space.samples) if had is None else had[1]
     ready = prepare(Correctives(layers=tuple(layers[:at])), rig)
     sculpted = np.asarray(target, np.float32)
-    layer = _with_vertices(layer, _perhaps_moved(points, rig, ready, pose, sculpted))
-    targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
-    targets[-1] = sculpted[layer.vertices]
-    below = [s.pose for lower in layers[:at] for s in lower.space.samples]
-    space = with_rest_falloffs(layer.space)
-    space = space.replace(anchors=anchors_of(space, below))
-    layers[at], report = extract_layer(
-        points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer,
-        (len(space.samples) - 1,))
+    perhaps = _perhaps_moved(points, rig, ready, pose, sculpted)
+    found = None
+    if had is not None and same_bits(layers[at].space.samples[k], sample):
+        found = sculpted_again(points, rig, ready, layers[at], k, sculpted, perhaps)
+    if found is None:
+        found = _extracted(points, rig, layers, at, k, sample, ready, sculpted, perhaps)
+    layers[at], report = found
     if at + 1 == len(layers):
         return Extracted(Correctives(layers=tuple(layers)), (report,))
     rest = refresh(points, rig, Correctives(layers=tuple(layers)), at + 1, kept)
     return Extracted(rest.correctives, (report, *rest.reports))
+
+
+def _extracted(
+    points: NDArray[np.float32], rig: Rig, layers: Sequence[PoseLayer], at: int, k: int, sample: PoseSample,
+    ready: Sequence[Prepared], sculpted: NDArray[np.float32], perhaps: NDArray[np.int32],
+) -> tuple[PoseLayer, LayerReport]:
+    """The layer `at` with a sample as its `k`-th, extracted anew from the surface (V, 3) sculpted there."""
+    samples = layers[at].space.samples
+    sources = [None if i == k else i for i in range(max(len(samples), k + 1))]
+    layer = _resampled(layers[at], (*samples[:k], sample, *samples[k + 1 :]), sources)
+    layer = _with_vertices(layer, perhaps)
+    targets = np.where(layer.moved[..., None], layer.targets, np.float32(np.nan))
+    targets[k] = sculpted[layer.vertices]
+    below = [s.pose for lower in layers[:at] for s in lower.space.samples]
+    space = with_rest_falloffs(layer.space)
+    space = space.replace(anchors=anchors_of(space, below))
+    return extract_layer(
+        points, rig, ready, layer.name, space, layer.vertices, targets, layer.moved, layer, (k,))
 
 
 def find_pose(correctives: Correctives, name: str) -> tuple[int, int] | None:

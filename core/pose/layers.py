@@ -182,7 +182,7 @@ def extract_layer(
     given = finite[..., 0] & finite[..., 1] & finite[..., 2]
     sampled = np.zeros(given.shape, np.bool_) if moved is None else moved & given
     surfaces = np.where(given[..., None], targets, 0.0).astype(np.float64)
-    states = {k: _state(points, rig, below, poses[k], vertices) for k in new}
+    states = {k: state_at(points, rig, below, poses[k], vertices) for k in new}
     for k, state in states.items():
         surfaces[k, ~given[k]] = state.posed[~given[k]]
         sampled[k] |= np.linalg.norm(surfaces[k] - state.posed, axis=1) > least
@@ -201,16 +201,16 @@ def extract_layer(
     for k in range(count):
         mine = sampled[k] & flagged & (True if k in states else ~was_after)
         if mine.any():
-            state = _state(points, rig, below, poses[k], vertices[mine])
+            state = state_at(points, rig, below, poses[k], vertices[mine])
             deltas[k, mine] = after_skinning(state.affine, state.matrices, surfaces[k, mine] - state.posed)
     shares = skin_shares(space.dofs, space.weighted, rig, vertices)
     known = sampled.copy()
     if like is None or like.kind == "pose-space":
-        _hold(space, known, deltas, shares, least)
+        hold(space, known, deltas, shares, least)
     for k in range(count):
         held = known[k] & ~sampled[k]
         if k not in states and held.any():  # nobody sculpted them there: they stay where the layers below have them
-            surfaces[k, held] = _state(points, rig, below, poses[k], vertices[held]).posed
+            surfaces[k, held] = state_at(points, rig, below, poses[k], vertices[held]).posed
     keys = run_keys(flagged, known, shares)
     order = np.lexsort(keys[::-1]) if len(rows) else np.zeros(0, np.int64)
     layer = PoseLayer(
@@ -229,15 +229,21 @@ def diagonal(points: NDArray[np.float32]) -> float:
     return float(np.linalg.norm([np.ptp(points[:, k]) for k in range(3)])) if len(points) else 0.0
 
 
-class _State(NamedTuple):
+class State(NamedTuple):
+    """Of n vertices at a pose.
+
+    matrices : (J, 4, 4) of the skin. posed : (n, 3) float64, object space, with all layers below.
+    """
+
     matrices: Array
-    affine: Affine  # of n vertices
-    posed: Array  # (n, 3) float64, object space, with all layers below
+    affine: Affine
+    posed: Array
 
 
-def _state(
+def state_at(
     points: NDArray[np.float32], rig: Rig, below: Sequence[Prepared], pose: Pose, vertices: NDArray[np.int32]
-) -> _State:
+) -> State:
+    """What the skin does at a pose to some vertices, and where the layers below have them."""
     local = local_of_pose(rig.skeleton, pose)
     matrices = skin_matrices_of(rig.skeleton, local)
     morphed, late = corrected(points, rig, tuple(below), felt(pose, rig, points, local))
@@ -249,10 +255,10 @@ def _state(
             turn = surface_rotations(skin_affine(rig, matrices, places), matrices)
             moves[places] += np.einsum("nij,nj->ni", turn, frame_moves.astype(np.float64))
         posed += moves[vertices]
-    return _State(matrices, affine, posed)
+    return State(matrices, affine, posed)
 
 
-def _hold(
+def hold(
     space: PoseSpace, known: NDArray[np.bool_], deltas: NDArray[np.float32], shares: Array, least: float
 ) -> None:
     """Add to the samples of each vertex, in place, those poses where it would be moved though nobody sculpted it.

@@ -12,6 +12,7 @@ from core.evaluator import Evaluator
 from core.formats.project import read_project, write_project
 from core.leaves import same_bits
 from core.mesh.mesh import Mesh
+from core.pose import edit_layers
 from core.pose.clip import split_matrices
 from core.pose.controls import rotation_dof
 from core.pose.corrective import as_kind
@@ -28,6 +29,7 @@ from core.pose.layers import Sculpt, build
 from core.pose.pose import Pose, local_of_pose
 from core.pose.pose_space import Correctives, PoseSpace
 from core.pose.refusal import Refusal
+from core.pose.resculpt import sculpted_again
 from core.pose.rig import Control
 from core.pose.skeleton import Clip
 from core.pose.solve import solve, weights
@@ -331,6 +333,49 @@ def test_refused_records():
     ):
         with pytest.raises(ValueError):
             wrong()
+
+
+@pytest.mark.parametrize("skinning", ["linear", "dual-quaternion"])
+def test_a_further_stroke_is_as_if_all_had_been_sculpted_at_once(skinning, monkeypatch):
+    """Where only corrections change the layer is not extracted anew; where more does, it is: the same comes out."""
+    rig, points = arm(skinning=skinning)
+    made = sculpts(rig, points)
+    half_turn = turned("half a turn", fore=(180, 0, 0))
+    made.append(Sculpt(half_turn, bumped(rig, points, half_turn, 3, 0.55, 0.3)))
+    looks = turned("b", fore=(10, 5, 70)), turned("c", {"flex": 0.6}, upper=(0, 20, 10), fore=(60, 0, 50))
+    first = build(points, rig, made).correctives
+    short = []
+    monkeypatch.setattr(edit_layers, "sculpted_again", lambda *a: short.append(sculpted_again(*a)) or short[-1])
+    stroke = np.float32([0.004, 0.01, -0.007])
+    for k in (1, 3, 7, len(made) - 1):
+        moved = np.abs(made[k].target - skinned_at(rig, points, made[k].pose)).max(axis=1) > 1e-4
+        elsewhere = np.flatnonzero(~moved)
+        for rows, whole in ((np.flatnonzero(moved)[::3], False), (elsewhere[::40], True)):
+            target = made[k].target.copy()
+            target[rows] += stroke
+            made[k] = made[k]._replace(target=target)
+            layers = add_sculpt(points, rig, first, made[k].pose, target).correctives
+            assert (short.pop() is None) == whole
+            truth = build(points, rig, made).correctives
+            assert worst(rig, points, layers, made) <= 1e-6
+            assert [[s.name for s in layer.space.samples] for layer in layers.layers] == [
+                [s.name for s in layer.space.samples] for layer in truth.layers]
+            for pose in looks:
+                apart = evaluate(points, rig, layers, pose) - evaluate(points, rig, truth, pose)
+                assert np.abs(apart).max() < 2e-6
+            first = layers
+
+
+def test_a_further_stroke_keeps_the_settings_of_a_layer_of_one_pose():
+    rig, points = arm(200)
+    pose = turned("bent", fore=(0, 0, 90))
+    reach, swing = {"fore": (0.5,)}, rotation_dof(rig.skeleton, "fore", "swing")
+    target = bumped(rig, points, pose, 0)
+    made = add_sculpt(points, rig, Correctives(), pose, target, reach, (swing,), kernel="wendland").correctives
+    for place in (0.4, 0.9):  # where it is sculpted, and where it is not yet
+        again = add_sculpt(points, rig, made, pose, bumped(rig, points, pose, 1, place)).correctives
+        assert same_bits(again.layers[0].space, made.layers[0].space)
+        assert not same_bits(again.layers[0].targets, made.layers[0].targets)
 
 
 @pytest.mark.parametrize("apart", [1, 1000])
