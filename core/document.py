@@ -20,8 +20,8 @@ from core.pose.pose import Pose
 from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
 from core.record import Record, column, number, text
+from core.units import METRES_PER_UNIT
 
-METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 RATES = (0.001, 100_000.0)  # frames per second
 FRAMES = (-(2**31), 2**31 - 1)
 

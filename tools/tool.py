@@ -63,7 +63,7 @@ class Ground:
     """What a stroke works on, as every craft knows it: how the artist looks, and at which side of symmetry.
 
     view : on the mirrored side of symmetry it may be reflected, so that tools need not know.
-    unit : of length, what numbers are shown in (core.document.METRES_PER_UNIT).
+    unit : of length, what numbers are shown in (core.units.METRES_PER_UNIT).
     mirrored : the other side of symmetry, for the few things a stroke does only once.
     """
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from core.document import METRES_PER_UNIT
 from core.errors import UserError
+from core.units import METRES_PER_UNIT
 
 
 def metres_of(unit: str | float) -> float:

@@ -8,17 +8,19 @@ take the layers, as long as the mesh is still the one they were made for.
 from __future__ import annotations
 
 import zlib
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from core.document import MeshObject
 from core.formats.rig_parts import RawRig, RawSculpts
 from core.pose.pose_space import Correctives, PoseLayer, PoseSpace, Way
 from core.pose.rig import Constraint, Control, Rig
 from core.record import freeze
+
+if TYPE_CHECKING:
+    from core.document import MeshObject
 
 VERSION = 1
 SCOPE, SAID = "Corrections", "filoplume:said"

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from core.document import (
-    METRES_PER_UNIT,
     Document,
     MeshObject,
     find_groom,
@@ -20,6 +19,7 @@ from core.errors import UserError
 from core.field import fields_of
 from core.pose.rig import Rig
 from core.pose.skeleton import Skeleton, SkinWeights
+from core.units import METRES_PER_UNIT
 from core.workspace import Workspace
 from tests.documents import grid_mesh, small_document
 

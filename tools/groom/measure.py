@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from core.document import METRES_PER_UNIT
 from core.groom.guides import Guides
 from core.groom.length import lengths
 from core.overlay import Label, Marker, Overlays, Polyline
 from core.record import Record
+from core.units import METRES_PER_UNIT
 from tools.groom.craft import GroomGround
 from tools.tool import Hit, Pointer, Stroke, Tool
 

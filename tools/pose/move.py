@@ -6,11 +6,11 @@ from typing import Annotated
 
 import numpy as np
 
-from core.document import METRES_PER_UNIT
 from core.field import field
 from core.overlay import Circle, Label, Overlay, Overlays, Polyline, Tone
 from core.pose.pose import SAME, Pose, Vector
 from core.transform import Array
+from core.units import METRES_PER_UNIT
 from tools.pose.craft import PoseGround, Posing
 from tools.pose.posing import (
     AXES,

@@ -10,9 +10,9 @@ import re
 from typing import NamedTuple
 
 from core import expression
-from core.document import METRES_PER_UNIT
 from core.expression import ExpressionError
 from core.field import Field
+from core.units import METRES_PER_UNIT
 
 _LENGTHS = {**METRES_PER_UNIT, "um": 1e-6, "µm": 1e-6, "km": 1000.0}
 _ANGLES = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0, "turn": math.tau}

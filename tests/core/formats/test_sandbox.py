@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import pytest
 from core.errors import UserError
 from core.formats.sandbox import run_bounded
 
+ROOT = Path(__file__).parents[3]
 TARGETS = "tests.core.formats.sandbox_targets:"
 posix = pytest.mark.skipif(sys.platform == "win32", reason="limits of memory need the resource module")
 
@@ -96,3 +99,15 @@ def test_nothing_is_left_behind(tmp_path, monkeypatch):
     with pytest.raises(UserError):
         call("crash")
     assert os.listdir(tmp_path) == []
+
+
+def test_readers_in_the_child_wait_for_no_kernels():
+    readers = "usd_mesh", "usd_curves", "usd_cameras", "usd_camera_path", "alembic_mesh", "alembic_curves", "picture"
+    code = f"""
+import importlib, sys
+for name in {readers!r}:
+    importlib.import_module("core.formats." + name)
+print([name for name in ("numba", "scipy", "cv2", "core.document") if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.strip() == "[]"
