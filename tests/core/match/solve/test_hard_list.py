@@ -76,6 +76,8 @@ def test_a_dolly_zoom_declared_fixed_is_solved_with_a_zoom_and_that_is_said():
     np.testing.assert_allclose(course / course[0], 1.0, rtol=0.01)
     np.testing.assert_allclose(course, 1.0, rtol=0.05)
     assert any("focal length changes" in words for words in told.warnings)
+    assert 0.05 * FOCAL < told.focal_sigma_px < 0.5 * FOCAL
+    assert any("by one factor on all frames" in words for words in told.warnings)
 
 
 def test_tracks_that_slide_slowly_and_straight_are_left_out():
