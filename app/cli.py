@@ -11,13 +11,14 @@ import importlib
 import json
 import os
 import sys
+import threading
 import traceback
 from pathlib import Path
 
 import typer
 
 from core.errors import UserError
-from core.kernel_cache import kernels_compiled, note_compiled
+from core.kernel_cache import kernels_compiled
 
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
 COMMANDS = (
@@ -25,6 +26,7 @@ COMMANDS = (
     "flow", "solve", "stmap", "photomodel", "run", "bake", "publish", "bench", "doctor", "demo",
 )
 HELP = ("-h", "--help")
+COMPILING_AFTER = 4.0  # seconds of loading a command, which take one or two when its kernels are in the cache
 
 
 # typer carries a click of its own; this is its base class of everything said wrongly on the command line
@@ -109,13 +111,17 @@ def _run(arguments: list[str]) -> int:
 
 
 def _with(chosen: str) -> typer.Typer:
-    """The application with one command, whose kernels are compiled when it is loaded for the first time."""
-    if chosen != "window" and not kernels_compiled(chosen):  # the window shows how far it is
-        print("filoplume: the first time, this compiles what it needs; that may take a minute.", file=sys.stderr)
-    # one command alone would lose its name, so a second, light one stands beside it
-    cli = build((chosen, "bench" if chosen == "run" else "run"))
-    note_compiled(chosen)
-    return cli
+    """The application with one command. Loading it compiles its kernels the first time, which is said when it lasts."""
+    said = threading.Timer(COMPILING_AFTER, lambda: print(
+        "filoplume: compiling for the first time, which may take a minute", file=sys.stderr))
+    said.daemon = True
+    if not kernels_compiled():
+        said.start()
+    try:
+        # one command alone would lose its name, so a second, light one stands beside it
+        return build((chosen, "bench" if chosen == "run" else "run"))
+    finally:
+        said.cancel()
 
 
 def _wants_window(arguments: list[str]) -> bool:

@@ -49,22 +49,23 @@ def kernel_modules() -> tuple[str, ...]:
     return tuple(".".join(parts) for parts in found if parts[-1] != Path(__file__).stem)
 
 
-def kernels_compiled(command: str = "") -> bool:
-    """True when :func:`note_compiled` was called for these sources: for all of them, or for those of the command."""
-    return any(note is not None and note.exists() for note in (_note(), _note(command)))
+def kernels_compiled() -> bool:
+    """True when :func:`note_compiled` was called for these sources."""
+    note = _note()
+    return note is not None and note.exists()
 
 
-def note_compiled(command: str = "") -> None:
-    """All kernels, or those of a command, are in the cache now. One that cannot be written to is no reason to stop."""
-    note = _note(command)
+def note_compiled() -> None:
+    """All kernels are in the cache now. A folder that cannot be written to is no reason to stop."""
+    note = _note()
     if note is not None:
         with suppress(OSError):
             note.touch()
 
 
-def _note(command: str = "") -> Path | None:
+def _note() -> Path | None:
     folder = os.environ.get("NUMBA_CACHE_DIR")
-    return Path(folder) / f"compiled-{source_hash()}{command and '-' + command}" if folder else None
+    return Path(folder) / f"compiled-{source_hash()}" if folder else None
 
 
 def _kernel_files() -> list[Path]:
