@@ -89,7 +89,7 @@ class Solids:
         target.depth_mask = False
         if options.grid:
             low, high = extent(outline)
-            self.grid.draw(camera, 0.5 * (low + high), uniforms, samples)
+            self.grid.draw(camera, 0.5 * (low + high), uniforms, target.viewport[2:], samples)
         ctx.enable(moderngl.CULL_FACE)
         for mesh in self.meshes:
             if mesh.surface.ghost:
