@@ -52,7 +52,8 @@ from app.window.pose.side import BesideView, PoseSide
 from app.window.preferences import Preferences
 from app.window.screenshot import Photographer
 from app.window.sections import Column, FoldMemory, Section
-from app.window.settings import Settings, save_settings
+from app.window.settings import Settings
+from app.window.settings_keeper import SettingsKeeper
 from app.window.shelf import Shelf
 from app.window.status_line import StatusLine
 from app.window.theme import apply, load_theme, look_of
@@ -87,6 +88,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._settings, self._folder = settings, folder
         self.desk = Desk(session, self)
+        self._keeper = SettingsKeeper(self.desk, folder)
         self.commands = Commands(self)
         self.commands.add(all_commands(session.tools))
         loaded = keymaps.load(settings.keymap, folder)
@@ -373,7 +375,7 @@ class MainWindow(QMainWindow):
         """Take other preferences at once, and keep them."""
         old, self._settings = self._settings, self._settings.replace(**changes)
         new = self._settings
-        self.desk.attempt(save_settings, new, self._folder)
+        self._keeper.keep(new)
         if (old.theme, old.text_size) != (new.theme, new.text_size):
             application = QApplication.instance()
             assert isinstance(application, QApplication)
@@ -524,6 +526,7 @@ class MainWindow(QMainWindow):
         if self._keeps_place:
             self.change_settings(geometry=_text(self.saveGeometry()), panels=_text(self.split.saveState()))
         self.desk.jobs.close()
+        self._keeper.close()
         self.viewport.release_gl()
         self.viewport.plate.close()
         self.desk.session.changed = None

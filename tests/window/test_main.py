@@ -57,7 +57,7 @@ def test_the_title_and_the_top_say_whether_work_is_saved(hand: Hand, tmp_path: P
     assert "saved" in window.top.file.text()
     saved, _ = read_project(tmp_path / "mine.filo")
     assert (saved.grooms[0].guides.points == window.desk.document.grooms[0].guides.points).all()
-    assert load_settings().settings.recent == (str(tmp_path / "mine.filo"),)
+    hand.until(lambda: load_settings().settings.recent == (str(tmp_path / "mine.filo"),))
 
 
 def test_the_console_leaves_the_view_its_room_and_takes_the_keys_while_it_is_there(hand: Hand) -> None:
@@ -114,11 +114,13 @@ def test_panels_are_shown_and_hidden(name: str, opened: Opened, animal: Document
 
 
 def test_theme_text_and_keymap_change_at_once_and_are_kept(opened: Opened) -> None:
-    window = opened().window
+    hand = opened()
+    window = hand.window
     try:
         window.commands.run("window.theme")
         window.commands.run("window.text_larger")
         window.change_settings(keymap="maya")
+        hand.until(lambda: not window.desk.jobs.running)
         assert look_of().theme.name.lower() == "light"
         assert look_of().text == 13
         assert window.hotkeys.keymap.name == "Maya"
