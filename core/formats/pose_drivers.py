@@ -203,9 +203,11 @@ def write_blender(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:
     path.write_text(BLENDER.format(
         name=item.name, vertices=len(item.mesh.points), joints=joints, inputs=made.inputs,
         rests={c.name: c.rest for c in rig.controls}, shapes=shapes, function=python_function(made),
-        dual=rig.skinning == "dual-quaternion",
+        dual=rig.skinning != "linear",
     ), encoding="utf-8")
-    return found.notes
+    if rig.skinning != "mixed":
+        return found.notes
+    return (*found.notes, f"{item.name} is skinned in two ways, which Blender is not: all of it keeps its volume.")
 
 
 def write_maya(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:

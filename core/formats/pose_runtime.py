@@ -83,7 +83,7 @@ class RuntimeHead(msgspec.Struct, forbid_unknown_fields=True):
     version: int
     name: str
     arrays: str
-    skinning: Literal["linear", "dual-quaternion"]
+    skinning: Literal["linear", "dual-quaternion", "mixed"]
     joints: list[str]
     shapes: list[str]
     numbers: dict[str, float]
@@ -113,6 +113,8 @@ def runtime_of(item: MeshObject, arrays_name: str) -> Runtime:
         "points": item.mesh.points,
         "file_vertices": np.arange(len(item.mesh.points)) if rig.file_vertices is None else rig.file_vertices,
     }
+    if rig.dual is not None:
+        arrays["dual"] = rig.dual
     if rig.shapes is not None:
         arrays |= _targets_with_rest(rig.shapes)
     layers = [_layer(k, ready, arrays) for k, ready in enumerate(prepare(item.correctives, rig))]
@@ -233,6 +235,8 @@ def _layer(k: int, ready: Prepared, arrays: dict[str, NDArray[Any]]) -> RuntimeL
 def _expected(head: RuntimeHead) -> dict[str, tuple[str, tuple[int | None, ...]]]:
     """dtype and shape of every array that `head` announces."""
     out = {name: kind for name, kind in ARRAYS.items() if head.shapes or not name.startswith("shape")}
+    if head.skinning == "mixed":
+        out["dual"] = ("|b1", (None,))
     for k, layer in enumerate(head.layers):
         for s in range(len(layer.systems)):
             out |= {f"layer{k}.system{s}.{name}": kind for name, kind in SYSTEM_ARRAYS.items()}
@@ -282,7 +286,7 @@ def _check(head: RuntimeHead, arrays: dict[str, NDArray[Any]]) -> None:
     parents = arrays["parents"]
     must(bool(((parents < np.arange(joints)) & (parents >= -1)).all()), "parents come later")
     must(arrays["joints"].shape == arrays["weights"].shape, "weights are missing")
-    must(len(arrays["joints"]) == vertices, "the skin does not fit")
+    must(len(arrays["joints"]) == vertices == len(arrays.get("dual", arrays["joints"])), "the skin does not fit")
     within("joints", joints)
     within("file_vertices", vertices)
     if head.shapes:

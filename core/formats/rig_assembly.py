@@ -79,17 +79,18 @@ def assemble(raw: RawRig, name: str, metres_given: float | None, up_given: str |
         notes.append("Its mesh is not the one its corrections were sculpted on; they are blend shapes now.")
     raw = _to_metres(raw, metres, up)
     skeleton, row_of = _skeleton(raw, notes)
-    mesh, file_vertices, skin, shapes = None, None, no_skin(0), None
+    mesh, file_vertices, skin, shapes, dual = None, None, no_skin(0), None, None
     if raw.polygons is not None:
         joints, weights = _skin(raw, row_of, len(skeleton.names), notes)
         if (joints == len(skeleton.names)).any():
             skeleton = _with_still(skeleton)
         targets = _targets(raw, notes)
-        repaired = repair(raw.polygons, _alike(joints, weights, targets, len(raw.polygons.points)))
+        repaired = repair(raw.polygons, _alike(joints, weights, targets, raw.dual, len(raw.polygons.points)))
         mesh = repaired.mesh
         went = repaired.vertex_of_source
         first = np.unique(went, return_index=True)[1]
         skin = compacted(joints[first], weights[first])
+        dual = None if raw.dual is None else freeze(raw.dual[first])
         shapes = _shapes(targets, went, first)
         if len(first) < len(went):
             file_vertices = freeze(went.astype(np.int32))
@@ -107,8 +108,7 @@ def assemble(raw: RawRig, name: str, metres_given: float | None, up_given: str |
     clips = _clips(raw, skeleton, row_of, renamed, notes)
     rig = Rig(
         skeleton=skeleton, skin=skin, clip=clips[0] if clips else None, clips=clips[1:], shapes=shapes,
-        skinning="dual-quaternion" if raw.skinning == "dual-quaternion" else "linear", controls=controls,
-        file_vertices=file_vertices,
+        skinning=raw.skinning, dual=dual, controls=controls, file_vertices=file_vertices,
     )
     correctives = None
     if found is not None and mesh is not None:
@@ -283,7 +283,8 @@ def _targets(raw: RawRig, notes: list[str]) -> list[RawShape]:
 
 
 def _alike(
-    joints: NDArray[np.int64], weights: NDArray[np.float64], targets: list[RawShape], count: int
+    joints: NDArray[np.int64], weights: NDArray[np.float64], targets: list[RawShape], dual: NDArray[np.bool_] | None,
+    count: int,
 ) -> NDArray[np.uint64]:
     """A number (V,) for each vertex, equal for those that joints and shapes move alike: only they may be welded."""
     mixed = np.zeros(count, np.uint64)
@@ -300,6 +301,8 @@ def _alike(
         joint = np.where(share > 0.0, np.take_along_axis(joints, row, 1)[:, 0], -1)
         add(every, joint.astype(np.uint64))
         add(every, np.round(share, 6).astype(np.float32).view(np.uint32).astype(np.uint64))
+    if dual is not None:
+        add(every, dual.astype(np.uint64))
     for number, target in enumerate(targets):
         moves = (target.offsets != 0.0).any(axis=1)
         rows = target.vertices[moves]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,7 @@ class RawRig(NamedTuple):
     names, parents, rest, bind : as in ``Skeleton``; parents in any order, any values.
     joints, weights : (V, K) of the vertices, any values.
     rests : where shapes rest that do not rest at 0.
+    skinning, dual : as of ``Rig``.
     """
 
     polygons: Polygons | None
@@ -63,20 +64,25 @@ class RawRig(NamedTuple):
     shapes: tuple[RawShape, ...] = ()
     rests: Mapping[str, float] = {}
     clips: tuple[RawClip, ...] = ()
-    skinning: str = "linear"
+    skinning: Literal["linear", "dual-quaternion", "mixed"] = "linear"
     metres_per_unit: float | None = None
     up: str | None = None
     notes: tuple[str, ...] = ()
     sculpts: RawSculpts | None = None
+    dual: NDArray[np.bool_] | None = None
 
 
 class RigPiece(NamedTuple):
-    """One mesh of a file: (V, K) joints and weights, and the targets of its shapes by name."""
+    """One mesh of a file: (V, K) joints and weights, and the targets of its shapes by name.
+
+    dual : (V,) which vertices are skinned by dual quaternions, None for none.
+    """
 
     polygons: Polygons
     joints: NDArray[np.int64]
     weights: NDArray[np.float64]
     shapes: dict[str, Targets]
+    dual: NDArray[np.bool_] | None = None
 
 
 def join_pieces(
@@ -247,6 +253,8 @@ def pack_rig(raw: RawRig) -> dict[str, Any]:
     for row, clip in enumerate(raw.clips):
         for field in ("translations", "rotations", "scales", "numbers"):
             answer[f"clip{row}_{field}"] = getattr(clip, field)
+    if raw.dual is not None:
+        answer["dual"] = raw.dual
     if raw.sculpts is not None:
         answer["sculpts"] = raw.sculpts.said
         answer |= {f"sculpts {name}": array for name, array in raw.sculpts.arrays.items()}
@@ -279,5 +287,5 @@ def unpack_rig(answer: dict[str, Any]) -> RawRig:
     return RawRig(
         polygons, tuple(answer["names"]), answer["parents"], answer["rest"], answer["bind"], answer["joints"],
         answer["weights"], tuple(shapes), answer["rests"], tuple(clips), answer["skinning"],
-        answer["metres_per_unit"], answer["up"], tuple(answer["notes"]), sculpts,
+        answer["metres_per_unit"], answer["up"], tuple(answer["notes"]), sculpts, answer.get("dual"),
     )  # fmt: skip

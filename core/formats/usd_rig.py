@@ -5,7 +5,7 @@ Every SkelAnimation of the stage is a clip, frames are time codes. A mesh lies w
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from core.formats.rig_parts import (
     rest_from_bind,
 )
 from core.formats.usd_mesh import mesh_piece
+from core.formats.usd_skel_write import DUAL
 from core.formats.usd_stage import open_stage
 from core.pose.clip import check_frames, split_matrices
 
@@ -62,7 +63,7 @@ def read_in_child(path: str) -> dict[str, Any]:
     said = stage.HasAuthoredMetadata
     notes: list[str] = []
     bound, skels = _bindings(stage, notes)
-    pieces, methods = _meshes(stage, bound, skels, notes)
+    pieces = _meshes(stage, bound, skels, notes)
     names = _names([token for skel in skels for token in skel.tokens])
     clips = _clips(stage, skels, {n for p in pieces for n in p.shapes})
     polygons, joints, weights = None, np.zeros((0, 0), np.int64), np.zeros((0, 0))
@@ -72,8 +73,7 @@ def read_in_child(path: str) -> dict[str, Any]:
         polygons, joints, weights, shapes = join_pieces([
             piece._replace(polygons=polygon) for piece, polygon in zip(pieces, renamed, strict=True)
         ])  # fmt: skip
-    if len(methods) > 1:
-        notes.append("Its meshes are skinned in different ways; dual quaternions are used for all of them.")
+    skinning, dual = _skinning(pieces)
 
     def stacked(parts: list[Array]) -> Array:
         return np.concatenate([np.zeros((0, 4, 4)), *parts])
@@ -84,10 +84,10 @@ def read_in_child(path: str) -> dict[str, Any]:
         stacked([s.local(s.rest) for s in skels]),
         stacked([s.object_from_bind @ s.bind @ np.diag([1 / s.scale] * 3 + [1.0]) for s in skels]),
         joints, weights, shapes, {}, tuple(clips),
-        "dual-quaternion" if "dualQuaternion" in methods else "linear",
+        skinning,
         float(UsdGeom.GetStageMetersPerUnit(stage)) if said("metersPerUnit") else None,
         str(UsdGeom.GetStageUpAxis(stage)).lower() if said("upAxis") else None, tuple(notes),
-        usd_corrections.read(stage),
+        usd_corrections.read(stage), dual,
     ))  # fmt: skip
 
 
@@ -179,14 +179,13 @@ def _names(tokens: list[str]) -> tuple[str, ...]:
 
 def _meshes(
     stage: Any, bound: dict[str, tuple[int, Any]], skels: list[_Skel], notes: list[str]
-) -> tuple[list[RigPiece], set[str]]:
+) -> list[RigPiece]:
     from pxr import Usd, UsdGeom
 
     time = Usd.TimeCode.EarliestTime()
     transforms = UsdGeom.XformCache(time)
     shown: list[RigPiece] = []
     hidden: list[RigPiece] = []
-    methods: set[str] = set()
     still = sum(len(s.tokens) for s in skels)  # one past the joints: what no joint moves
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdGeom.Mesh):
@@ -197,23 +196,48 @@ def _meshes(
         if found is not None and found[1].HasJointInfluences():
             skel, skinning = skels[found[0]], found[1]
             world = skel.object_from_bind @ np.array(skinning.GetGeomBindTransform(time), np.float64).T
-            methods.add(str(skinning.GetSkinningMethod()))
         piece = mesh_piece(prim, time, world.T)
         if piece is None:
             continue
         count = len(piece.points)
         joints = np.full((count, 1 if still else 0), still, np.int64)
         weights = np.ones(joints.shape)
-        if skel is not None:
+        dual = None
+        if skel is not None and skinning is not None:
             joints, weights = _influences(prim, skinning, skel, count, time)
-        made = RigPiece(piece, joints, weights, _shapes(prim, count, world, notes))
+            dual = _dual(prim, str(skinning.GetSkinningMethod()), count)
+        made = RigPiece(piece, joints, weights, _shapes(prim, count, world, notes), dual)
         image = UsdGeom.Imageable(prim)
         is_shown = (
             image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
             and image.ComputeVisibility(time) != UsdGeom.Tokens.invisible
         )
         (shown if is_shown else hidden).append(made)
-    return shown or hidden, methods
+    return shown or hidden
+
+
+def _dual(prim: Any, method: str, count: int) -> NDArray[np.bool_]:
+    """Which vertices (count,) of a mesh its dual quaternions skin: those the writer said, else all of such a mesh."""
+    from pxr import UsdGeom
+
+    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(DUAL)
+    said = primvar.Get() if primvar else None
+    if method == "dualQuaternion" and said is not None and len(said) == count:
+        return np.array(said, np.bool_)
+    return np.full(count, method == "dualQuaternion")
+
+
+def _skinning(
+    pieces: list[RigPiece],
+) -> tuple[Literal["linear", "dual-quaternion", "mixed"], NDArray[np.bool_] | None]:
+    """How all pieces together are skinned, and which vertices by dual quaternions where not all are alike."""
+    skinned = [piece.dual for piece in pieces if piece.dual is not None]
+    if not any(dual.any() for dual in skinned):
+        return "linear", None
+    if all(dual.all() for dual in skinned):
+        return "dual-quaternion", None
+    return "mixed", np.concatenate([
+        np.zeros(len(piece.polygons.points), np.bool_) if piece.dual is None else piece.dual for piece in pieces])
 
 
 def _influences(

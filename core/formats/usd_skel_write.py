@@ -26,6 +26,7 @@ from core.pose.rig import Rig, resting_numbers
 from core.pose.synthesis import pose_at
 
 DRIVERS = "filoplume:drivers"
+DUAL = "filoplume:dualQuaternion"  # primvar: which vertices of a mesh of mixed skinning they skin
 STILL = "still"  # a joint for what no joint moves
 
 
@@ -64,7 +65,10 @@ def write(path: Path, item: MeshObject, fps: float) -> tuple[str, ...]:
     usd_corrections.write(stage, item, shapes)
     if not layer.Export(str(path)):
         raise UserError(f"{path.name} could not be written; choose another folder.")
-    return found.notes
+    if rig.dual is None:
+        return found.notes
+    return (*found.notes, f"{item.name} is skinned in two ways, which one mesh of USD is not: other programs skin all "
+            "of it by dual quaternions.")
 
 
 def joint_tokens(rig: Rig) -> list[str]:
@@ -101,7 +105,7 @@ def _skeleton(stage: Any, rig: Rig, tokens: list[str]) -> Any:
 
 
 def _mesh(stage: Any, item: MeshObject, rig: Rig, skeleton: Any) -> Any:
-    from pxr import Gf, Tf, UsdSkel, Vt
+    from pxr import Gf, Sdf, Tf, UsdGeom, UsdSkel, Vt
 
     made = define_mesh(stage, f"/Model/{Tf.MakeValidIdentifier(item.name)}_mesh", item.name, item.mesh)
     binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
@@ -113,7 +117,11 @@ def _mesh(stage: Any, item: MeshObject, rig: Rig, skeleton: Any) -> Any:
     wide = joints.shape[1]
     binding.CreateJointIndicesPrimvar(False, wide).Set(Vt.IntArray.FromNumpy(np.ascontiguousarray(joints).reshape(-1)))
     binding.CreateJointWeightsPrimvar(False, wide).Set(Vt.FloatArray.FromNumpy(weights.reshape(-1)))
-    if rig.skinning == "dual-quaternion":
+    if rig.dual is not None:
+        said = UsdGeom.PrimvarsAPI(made.GetPrim()).CreatePrimvar(
+            DUAL, Sdf.ValueTypeNames.BoolArray, UsdGeom.Tokens.vertex)
+        said.Set(Vt.BoolArray(rig.dual.tolist()))
+    if rig.skinning != "linear":
         binding.CreateSkinningMethodAttr(UsdSkel.Tokens.dualQuaternion)
     return made
 

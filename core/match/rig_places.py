@@ -66,7 +66,8 @@ def rig_places(
         points = np.ascontiguousarray(points[picked])
         skin = SkinWeights(joints=rig.skin.joints[picked], weights=rig.skin.weights[picked])
         controls = tuple(control for control in rig.controls if control.vertices is None)
-        small = rig.replace(skin=skin, controls=controls, file_vertices=None)
+        dual = None if rig.dual is None else rig.dual[picked]
+        small = rig.replace(skin=skin, dual=dual, controls=controls, file_vertices=None)
         picked = np.arange(len(picked), dtype=np.int32)
 
     def places(frame: int, values: Array) -> Array:

@@ -11,7 +11,7 @@ from core.pose.pose import Pose, local_of_pose
 from core.pose.pose_space import Correctives
 from core.pose.rig import Rig
 from core.pose.sculpt.symmetry import Opposites, mirrored_offsets, symmetrised_offsets
-from core.pose.skinning import skin_matrices_of, skinned
+from core.pose.skinning import carried, skin_matrices_of
 from core.pose.synthesis import corrected, evaluate, felt, prepare
 
 
@@ -30,7 +30,7 @@ def carried_surface(
     plain, _ = corrected(points, rig, (), felt_there)
     bare, _ = corrected(points, rig, (), felt(at, rig, points, here))
     matrices = skin_matrices_of(rig.skeleton, here)
-    out = skinned((bare + (sculpted - plain)).astype(np.float32), rig.skin, matrices, rig.skinning)
+    out = carried((bare + (sculpted - plain)).astype(np.float32), rig, matrices)
     for vertices, moves in late:
         turn = surface_rotations(skin_affine(rig, matrices, vertices), matrices)
         out[vertices] += np.einsum("nij,nj->ni", turn, moves).astype(np.float32)

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from core.pose.rig import Rig
 from core.pose.rotation import polar_rotation
-from core.pose.skeleton import SkinWeights
-from core.pose.skinning import skinned
+from core.pose.skinning import carried
 from core.transform import Array
 
 MOST_CONDITION = 30.0  # beyond it a correction before skinning is too large to be interpolated
@@ -47,9 +46,8 @@ def skin_affine(rig: Rig, matrices: Array, vertices: NDArray[np.int32]) -> Affin
             turn += share[:, None, None] * matrices[joints[:, k], :3, :3]
             move += share[:, None] * matrices[joints[:, k], :3, 3]
         return Affine(turn, move, strongest)
-    skin = SkinWeights(joints=joints, weights=weights)
     move, x, y, z = (
-        skinned(np.tile(np.float32(p), (n, 1)), skin, matrices, rig.skinning).astype(np.float64)
+        carried(np.tile(np.float32(p), (n, 1)), rig, matrices, vertices=vertices).astype(np.float64)
         for p in np.vstack([np.zeros(3), np.eye(3)])
     )
     return Affine(np.stack([x - move, y - move, z - move], axis=2), move, strongest)

@@ -93,7 +93,8 @@ class Rig(Record):
     skin : one row for each vertex of the mesh.
     clip : the motion that plays, or None. clips : further ones it may play; names are unique among all of them.
     shapes : blend shapes; the number of a control of the same name is their weight.
-    skinning : "linear" blend, or "dual-quaternion" (Kavan et al. 2008), which keeps volume in a twist.
+    skinning : "linear" blend, or "dual-quaternion" (Kavan et al. 2008), which keeps volume in a twist; "mixed" where
+        both meet in one mesh. dual : (V,) bool, of a mixed one, the vertices skinned by dual quaternions; else None.
     controls : abstract controls, one for each shape first; names are unique among themselves and the joints.
     constraints : what joints may do, and do because of others, while a pose is made by hand; in this order.
     file_vertices : (W,) int32, vertex of the mesh for each vertex of the file it was read from, None when they are the
@@ -105,7 +106,8 @@ class Rig(Record):
     clip: Clip | None = None
     clips: tuple[Clip, ...] = ()
     shapes: BlendShapes | None = None
-    skinning: Literal["linear", "dual-quaternion"] = "linear"
+    skinning: Literal["linear", "dual-quaternion", "mixed"] = "linear"
+    dual: np.ndarray | None = None
     controls: tuple[Control, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     file_vertices: np.ndarray | None = None
@@ -136,6 +138,10 @@ class Rig(Record):
         for one in self.constraints:
             if not {one.joint, one.target or one.joint} <= set(self.skeleton.names):
                 raise ValueError(f"Rig.constraints name a joint that the skeleton does not have: {one.joint!r}")
+        if (self.skinning == "mixed") != (self.dual is not None):
+            raise ValueError("Rig.dual must say which vertices dual quaternions skin, of mixed skinning only")
+        if self.dual is not None:
+            column(self, "dual", np.bool_, (vertices,))
         if self.file_vertices is not None:
             column(self, "file_vertices", np.int32, (None,))
             if self.file_vertices.size and not (self.file_vertices.min() >= 0 and self.file_vertices.max() < vertices):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba import njit
@@ -82,7 +82,32 @@ def deformed(
         weights = shape_weights(rig.shapes, {**resting_numbers(rig), **numbers})
         if weights.any():
             points = morphed(points, rig.shapes, weights, ranges)
-    return skinned(points, rig.skin, skin_matrices_of(rig.skeleton, local), rig.skinning, ranges)
+    return carried(points, rig, skin_matrices_of(rig.skeleton, local), ranges)
+
+
+def carried(
+    points: NDArray[np.float32], rig: Rig, matrices: NDArray[np.float64], ranges: Ranges = serial_ranges,
+    vertices: NDArray[np.int32] | None = None,
+) -> NDArray[np.float32]:
+    """Points (n, 3) float32, each carried as the rig skins it by skin matrices (J, 4, 4); a new array.
+
+    Parameters
+    ----------
+    vertices : (n,) whose weights carry the points; those of the mesh in their order when None.
+    """
+    skin = rig.skin if vertices is None else _rows(rig.skin, vertices)
+    if rig.skinning != "mixed":
+        return skinned(points, skin, matrices, rig.skinning, ranges)
+    assert rig.dual is not None
+    dual = rig.dual if vertices is None else rig.dual[vertices]
+    out = np.empty_like(points)
+    for mine, method in ((np.flatnonzero(~dual), "linear"), (np.flatnonzero(dual), "dual-quaternion")):
+        out[mine] = skinned(points[mine], _rows(skin, mine), matrices, method, ranges)  # type: ignore[arg-type]
+    return out
+
+
+def _rows(skin: SkinWeights, rows: NDArray[np.integer[Any]]) -> SkinWeights:
+    return SkinWeights(joints=skin.joints[rows], weights=skin.weights[rows])
 
 
 def skinned(
@@ -123,8 +148,8 @@ def moved_number(
         moved = ((matrices[joint] - at_rest[joint]) @ origin)[:3]
     else:
         piece = np.asarray(mesh_points, np.float32)[control.vertices]
-        skin = SkinWeights(joints=rig.skin.joints[control.vertices], weights=rig.skin.weights[control.vertices])
-        now, then = (skinned(piece, skin, m, rig.skinning).astype(np.float64) for m in (matrices, at_rest))
+        now, then = (
+            carried(piece, rig, m, vertices=control.vertices).astype(np.float64) for m in (matrices, at_rest))
         moved = (now - then).mean(axis=0)
     axis = np.array(control.axis) / np.linalg.norm(control.axis)
     return control.rest + float(moved @ axis) / control.travel

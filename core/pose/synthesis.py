@@ -19,7 +19,7 @@ from core.pose.extraction import skin_affine, surface_rotations
 from core.pose.pose import REST, Pose, local_of_pose, pose_of_local
 from core.pose.pose_space import Correctives, Dof, PoseLayer
 from core.pose.rig import Rig, resting_numbers
-from core.pose.skinning import local_at, moved_number, skin_matrices_of, skinned
+from core.pose.skinning import carried, local_at, moved_number, skin_matrices_of
 from core.pose.solve import Solved, solve, weights_at
 from core.transform import Array
 from core.workers import serial_ranges
@@ -209,7 +209,7 @@ def _added(
 ) -> NDArray[np.float32]:
     matrices = skin_matrices_of(rig.skeleton, local)
     points, late = corrected(mesh_points, rig, prepared, felt(pose, rig, mesh_points, local), ranges)
-    out = skinned(points, rig.skin, matrices, rig.skinning, ranges)
+    out = carried(points, rig, matrices, ranges)
     for vertices, moves in late:
         turn = surface_rotations(skin_affine(rig, matrices, vertices), matrices)
         out[vertices] += np.einsum("nij,nj->ni", turn, moves).astype(np.float32)

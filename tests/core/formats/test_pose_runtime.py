@@ -64,6 +64,14 @@ def test_with_every_option(options, tmp_path):
     check(posed_arm((BENT, HALF, FLEXED, BOTH), **options), tmp_path)
 
 
+def test_with_both_ways_of_skinning_in_one_mesh(tmp_path):
+    rig = posed_arm(()).rig
+    dual = np.arange(len(rig.skin.joints)) % 3 == 0
+    check(posed_arm(rig=rig.replace(skinning="mixed", dual=freeze(dual))), tmp_path)
+    _, arrays = read_runtime(tmp_path / "arm.json")
+    assert np.array_equal(arrays["dual"], dual)
+
+
 @pytest.mark.parametrize("squashed", [False, True])
 def test_with_dual_quaternions(squashed, tmp_path):
     """Where `squashed`, of joints that are scaled and sheared at rest, one of them mirrored."""

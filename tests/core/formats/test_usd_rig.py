@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
+from core.document import Document, MeshObject
 from core.errors import UserError
+from core.formats.project import read_project, write_project
 from core.formats.rig_file import read_rig
+from core.formats.usd_skel_write import write
 from core.pose.clip import numbers_at
+from core.pose.layers import Sculpt, build
+from core.pose.pose import Pose
 from core.pose.rig import playing
 from core.pose.skinning import posed_points
+from core.pose.synthesis import evaluate
 
 POINTS = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 
@@ -208,3 +214,48 @@ def test_noise_is_refused(tmp_path):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(UserError, match=name):
             read_rig(tmp_path / name)
+
+
+def test_meshes_skinned_in_two_ways_move_as_usdskel_moves_each(tmp_path):
+    """Sculpts are met on both, and a project, a USD of ours and the runtime file keep what is skinned how."""
+    made = Made(tmp_path)
+    other = made.square("other", made.skel)
+    rng = np.random.default_rng(5)
+    for mesh in (made.mesh, other):
+        binding = UsdSkel.BindingAPI(mesh.GetPrim())
+        shares = rng.uniform(0.2, 0.8, 4)
+        binding.CreateJointIndicesPrimvar(False, 2).Set([0, 1] * 4)
+        binding.CreateJointWeightsPrimvar(False, 2).Set(np.stack([shares, 1 - shares], axis=1).reshape(-1).tolist())
+    UsdSkel.BindingAPI(other.GetPrim()).CreateSkinningMethodAttr(UsdSkel.Tokens.dualQuaternion)
+    anim = made.anim("anim", made.skel)
+    turns = [[Gf.Quatf(1), Gf.Quatf(float(np.cos(a)), Gf.Vec3f(0, float(np.sin(a)), 0))] for a in (0.2, 1.3)]
+    for frame, turn in zip((1, 3), turns):
+        anim.CreateRotationsAttr().Set(turn, frame)
+    made.stage.Save()
+    found = read_rig(made.path)
+    rig, points = found.rig, found.mesh.points
+    assert rig.skinning == "mixed"
+    assert rig.dual.sum() == 4
+    cache, there = UsdSkel.Cache(), np.arange(8) if rig.file_vertices is None else rig.file_vertices
+    cache.Populate(UsdSkel.Root(made.stage.GetPrimAtPath("/r")), Usd.PrimDefaultPredicate)
+    skeleton = cache.GetSkelQuery(made.skel)
+    for frame in (1, 2, 3):
+        ours = posed_points(points, rig, frame)[there]
+        for k, mesh in enumerate((made.mesh, other)):
+            query = cache.GetSkinningQuery(mesh.GetPrim())
+            truth = Vt.Vec3fArray.FromNumpy(POINTS)
+            assert query.ComputeSkinnedPoints(skeleton.ComputeSkinningTransforms(frame), truth, frame)
+            assert np.abs(ours[4 * k : 4 * k + 4] - np.array(truth)).max() < 1e-6
+    pose = Pose(name="twisted", rotations={"b": (0.0, 0.8, 0.0, 0.6)})
+    target = evaluate(points, rig, None, pose) + rng.normal(size=(len(points), 3)).astype(np.float32)
+    layers = build(points, rig, [Sculpt(pose, target)]).correctives
+    assert np.abs(evaluate(points, rig, layers, pose) - target).max() < 1e-5
+    item = MeshObject(id=1, name="two", mesh=found.mesh, rig=rig, correctives=layers)
+    write_project(tmp_path / "two.filo", Document(meshes=(item,)))
+    notes = write(tmp_path / "two.usda", item, 24)
+    assert "two ways" in notes[-1]
+    again = read_rig(tmp_path / "two.usda")
+    kept = read_project(tmp_path / "two.filo").document.meshes[0]
+    for mesh, one, corrections in ((again.mesh, again.rig, again.correctives), (kept.mesh, kept.rig, kept.correctives)):
+        assert np.array_equal(one.dual, rig.dual)
+        assert np.abs(evaluate(mesh.points, one, corrections, pose) - target).max() < 1e-5
