@@ -10,6 +10,7 @@ from core.document import Document
 from core.errors import UserError
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
+from core.match.line_up import as_before
 from core.match.solved import Advice, SolvedCamera, SolveSettings, cube_edges, frozen
 from core.match.track import Track
 
@@ -78,15 +79,20 @@ def _fix_words(kind: str, now: float, then: float, names: list[str], frames: np.
 
 
 def put_solve(document: Document, solved: SolvedCamera) -> Document:
-    """The document with a solved camera in place of that of the same plate; test cubes stay where they can."""
+    """The document with a solved camera in place of that of the same plate; its world and test cubes stay."""
     before = solved_of(document, solved.plate_id)
     if before is None:
         fresh = max((one.id for one in document.solves), default=0) + 1
         changed: Document = document.replace(solves=(*document.solves, solved.replace(id=fresh)))
         return changed
     cubes = tuple(i for i in before.cubes if i in solved.track_ids)
-    now = solved.replace(id=before.id, cubes=cubes)
-    changed = document.replace(solves=tuple(now if one is before else one for one in document.solves))
+    return replace_solve(document, as_before(solved, before).replace(id=before.id, cubes=cubes))
+
+
+def replace_solve(document: Document, solved: SolvedCamera) -> Document:
+    """The document with a solved camera in place of that of its id."""
+    changed: Document = document.replace(
+        solves=tuple(solved if one.id == solved.id else one for one in document.solves))
     return changed
 
 
@@ -99,9 +105,7 @@ def turn_cube(document: Document, track_id: int) -> Document:
     cube_edges(solved, track_id)
     there = track_id in solved.cubes
     cubes = tuple(i for i in solved.cubes if i != track_id) if there else (*solved.cubes, track_id)
-    changed: Document = document.replace(
-        solves=tuple(one.replace(cubes=cubes) if one is solved else one for one in document.solves))
-    return changed
+    return replace_solve(document, solved.replace(cubes=cubes))
 
 
 def forget_solve(document: Document, plate_id: int) -> Document:

@@ -58,12 +58,31 @@ class Advice(Record):
         number(self, "track_id", least=0, most=2**31 - 1)
 
 
+class LineUp(Record):
+    """What is said of the world of a solve, by ids of tracks; 0 and () where nothing is said.
+
+    origin : at the origin. axis : two, along +x. ground : three or more, level. distance : two, `length` metres apart.
+    """
+
+    origin: int = 0
+    axis: tuple[int, ...] = ()
+    ground: tuple[int, ...] = ()
+    distance: tuple[int, ...] = ()
+    length: float = 1.0
+
+    def __post_init__(self) -> None:
+        number(self, "origin", least=0, most=2**31 - 1)
+        number(self, "length", least=1e-9, most=1e9)
+        if len(self.axis) not in (0, 2) or len(self.distance) not in (0, 2) or len(self.ground) in (1, 2):
+            raise ValueError("LineUp must name two tracks of an axis and of a distance, three of the ground or more")
+
+
 class SolvedCamera(Record):
     """A camera of a plate, and where its tracks are.
 
     size : pixels of the plate. lens (L,), frames (F,) int32 rising, rotation (F, 3, 3), translation (F, 3), focal (F,),
     points (P, 3) : those of a `Shot`. track_ids (P,) int32. errors (P,) and by_frame (F,) : RMS in pixels.
-    kind : free, planar or nodal. cubes : ids of tracks a test cube stands at.
+    kind : free, planar or nodal. cubes : ids of tracks a test cube stands at. line_up : what holds the world.
     """
 
     id: int
@@ -87,6 +106,7 @@ class SolvedCamera(Record):
     advice: tuple[Advice, ...] = ()
     cubes: tuple[int, ...] = ()
     settings: SolveSettings = SolveSettings()
+    line_up: LineUp = LineUp()
 
     def __post_init__(self) -> None:
         number(self, "id", "plate_id", least=0, most=2**31 - 1)

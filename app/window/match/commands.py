@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from app.window.ask_text import ask_text
 from app.window.commands import Command, Window
 from core.document import Document
+from core.errors import UserError
 from core.match.follow import Way
-from tools import match_edits
+from tools import line_up_edits, match_edits
 from tools.match_edits import selected_tracks, shown_plate
 from tools.plate_edits import show_next_plate
 from tools.solve_edits import forget_solve, solved_of, tracks_to_solve, turn_cube
@@ -63,6 +65,11 @@ def needs_solved_plate(desk: Desk) -> str | None:
 def needs_solve(desk: Desk) -> str | None:
     """A track must be selected, and the camera of its plate solved."""
     return needs_track(desk) or needs_solved_plate(desk)
+
+
+def needs_two_solved(desk: Desk) -> str | None:
+    """Two tracks must be selected, and the camera of their plate solved."""
+    return needs_two(desk) or needs_solved_plate(desk)
 
 
 def frame_of(desk: Desk) -> int:
@@ -142,6 +149,20 @@ def _still(window: Window) -> None:
     eye.hold_still(None if eye.still is not None or not tracks else tracks[-1].id)
 
 
+def _ask_distance(window: Window) -> None:
+    tracks = chosen(window.desk)
+
+    def measured(words: str) -> None:
+        try:
+            length = float(words.replace(",", "."))
+        except ValueError:
+            raise UserError(f"{words!r} is no length; give metres as a number, such as 1.8.") from None
+        window.desk.edit("Set distance", line_up_edits.set_distance, tracks, length)
+
+    ask_text(window, "Set distance", "How far the two tracks are apart, in metres",
+             lambda words: window.desk.attempt(measured, words))
+
+
 def _command(
     name: str, label: str, tooltip: str, run: Callable[[Window], object], twin: str, undo: str | None = None,
     enabled: Callable[[Desk], str | None] = needs_track, words: str = "", icon: str | None = None,
@@ -182,6 +203,21 @@ MATCH: tuple[Command, ...] = (
     _command("cube", "Cube at track", "Stands a test cube on the point of the track, or takes it away.",
              lambda w: w.desk.edit("Test cube", turn_cube, chosen(w.desk)[-1]), "tools.solve_edits.turn_cube",
              "Test cube", needs_solve, "test object box insert"),
+    _command("origin", "Origin at track", "Puts the origin of the solved world at the point of the active track.",
+             lambda w: w.desk.edit("Set origin", line_up_edits.set_origin, chosen(w.desk)[-1]),
+             "tools.line_up_edits.set_origin", "Set origin", needs_solve, "line up coordinate system zero"),
+    _command("axis", "X axis along tracks", "Turns the solved world: x leads from the first track to the second.",
+             _edit("Set axis", line_up_edits.set_axis), "tools.line_up_edits.set_axis", "Set axis", needs_two_solved,
+             "line up coordinate system orient"),
+    _command("ground", "Ground through tracks", "Levels the solved world at three selected tracks or more, y up.",
+             _edit("Set ground", line_up_edits.set_ground), "tools.line_up_edits.set_ground", "Set ground",
+             needs_two_solved, "line up coordinate system floor plane level"),
+    _command("distance", "Distance between tracks…", "Scales the solved world so that two tracks are so far apart.",
+             _ask_distance, "tools.line_up_edits.set_distance", "Set distance", needs_two_solved,
+             "line up coordinate system scale size metres"),
+    _command("forget_line_up", "Forget the line-up", "Leaves the solved world where it is, held by no track any more.",
+             lambda w: w.desk.edit("Forget the line-up", line_up_edits.forget_line_up, _plate_id(w.desk)),
+             "tools.line_up_edits.forget_line_up", "Forget the line-up", needs_solved_plate, "coordinate system free"),
     _command("forget_solve", "Forget the solve", "Takes the solved camera of the plate away; tracks stay.",
              lambda w: w.desk.edit("Forget the solve", forget_solve, _plate_id(w.desk)),
              "tools.solve_edits.forget_solve", "Forget the solve", needs_solved_plate, "camera remove"),

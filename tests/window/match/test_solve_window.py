@@ -64,11 +64,15 @@ def test_a_camera_is_solved_judged_and_given_away(opened: Opened, tmp_path: Path
     window.commands.run("match.cube")
     assert desk.document.solves[0].cubes == (1,)
     hand.painted()
+    desk.edit("Select tracks", lambda document: document.replace(track_selection=(1, 2, 3)))
+    window.commands.run("match.ground")
+    assert desk.session.history.undo_name == "Set ground"
+    assert np.ptp(desk.document.solves[0].points[np.isin(solved.track_ids, (1, 2, 3)), 1]) < 1e-9
     out = tmp_path / "out.usda"
     window.match.doors.export_camera(out)
     hand.until(lambda: not desk.jobs.running, 60_000)
     np.testing.assert_allclose(read_shot(out, None).focal, solved.focal, rtol=1e-5)
-    for _ in range(4):  # cube, two selections, the solve
+    for _ in range(6):  # ground, cube, three selections, the solve
         window.commands.run("edit.undo")
     assert not desk.document.solves
 
