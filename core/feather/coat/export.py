@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from core.feather.coat.base import GIVE
 from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
-from core.feather.coat.plumage import GIVE, Laid
+from core.feather.coat.plumage import Laid
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
 from core.workers import Workers
 

@@ -15,15 +15,27 @@ from numpy.typing import NDArray
 from core import value as values
 from core.curve import Curve
 from core.evaluator import Evaluator
+from core.feather.coat.base import (
+    GIVE,
+    Base,
+    Stand,
+    changed_rows,
+    curved,
+    lie_down,
+    limited,
+    own_curves,
+    seed_of,
+)
 from core.feather.coat.bed import Bed, bind_to_keys, field_directions, make_bed
 from core.feather.coat.coat import FEATHER_FIELDS, FEATHER_VALUES, FeatherCoat
 from core.feather.coat.crossing import vane_boxes
-from core.feather.coat.ground import curvatures, smoothed
-from core.feather.coat.keys import attributes_of_keys, interpolate, interpolate_directions, key_shapes
+from core.feather.coat.frames import carried, field_frames, key_frames
+from core.feather.coat.ground import smoothed
+from core.feather.coat.keys import attributes_of_keys, interpolate, key_shapes
 from core.feather.coat.layering import Feathers, Layered, layer, layer_again
 from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
-from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.feather.coat.posing import LENGTH, pose_vanes
 from core.feather.coat.proxy import apply_proxies
 from core.feather.presets import load_bird, preset_values
 from core.feather.vane import SHAPE_COLUMNS, vane_grids
@@ -32,29 +44,12 @@ from core.groom.maps import sample_map
 from core.mesh.intrinsic import Binding
 from core.mesh.mesh import Mesh
 from core.mesh.skin import Skin, skin_at_rest
-from core.mesh.surface import root_frames, root_positions
 from core.random import rand
 from core.value import Formula, Value, evaluate_within, names_used
 
 ROWS, COLUMNS = 8, 5  # of a vane as it is layered
 STANDING = 0.28  # radians, lift of feathers without keys
 SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
-BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
-GIVE = np.radians(1.2)  # by which a frame may lift a feather where the skin does not bend
-ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
-FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
-
-
-class Base(NamedTuple):
-    """Feathers before they settle. give : (N,) float64, radians by which a frame may lift them beyond the rest.
-
-    feathers : vanes, roots, frames and ranks. poses : (N, 6) float64. fields : named columns (N,) expressions read.
-    """
-
-    feathers: Feathers
-    poses: NDArray[np.float64]
-    fields: dict[str, Any]
-    give: NDArray[np.float64]
 
 
 class Laid(NamedTuple):
@@ -192,7 +187,7 @@ class Plumage:
         rest, flow = self._directions(coat, keys, mesh, bed, self._binding(coat, keys, mesh))
         if skin is None or skin.points is mesh.points:
             return rest
-        return _carried(mesh, bed, rest, flow, skin)[1]
+        return carried(mesh, bed, rest, flow, skin)[1]
 
     def _base(
         self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None, rest_frame: float,
@@ -204,7 +199,7 @@ class Plumage:
         directions = self._directions(coat, keys, mesh, bed, binding)
         rest_frames, flow_frames = directions
         bend_of = self._remember(
-            "curvature", lambda: _curved(bed.positions, flow_frames, near, ranges), bed, directions)
+            "curvature", lambda: curved(bed.positions, flow_frames, near, ranges), bed, directions)
         fields = self._fields(coat, keys, mesh, bed, binding, directions, bend_of)
         kept = self._memory.get("kept order")
         if kept is not None and len(kept[1][0]) == count:
@@ -218,43 +213,17 @@ class Plumage:
         if (now != rest_frame and any(moves(item.value) for item in coat.attributes)) or moves(coat.width):
             own = self._own(coat, fields, now, mesh, keys, bed)  # what is animated, at this frame alone
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
-        positions, normals, frames = bed.positions, bed.normals, rest_frames
-        give = np.full(count, GIVE)
-        if skin is not None:
-            positions, frames, flow = _carried(mesh, bed, rest_frames, flow_frames, skin)
-            normals = frames[:, 2].astype(np.float64)
-            resting, bend_of = bend_of, _curved(positions, flow, near, ranges)
-            # where the skin bends, feathers may rise with it; elsewhere so little that nothing is seen to jump
-            give = GIVE + fields["length"] * np.abs(bend_of - resting).max(axis=1)
-        ids, seed = bed.places.ids, _seed(coat)
-        spread = [coat.variation * (2.0 * rand(ids, seed + 301 + k) - 1.0) for k in range(4)]
-        wind = _unit(np.asarray(coat.wind_direction, np.float64)[None])[0] * np.ones((count, 1))
-        behind = np.maximum(-np.einsum("nc,nc->n", wind, frames[:, 1]), 0.0) * numbers["wind"]
-        aside = np.einsum("nc,nc->n", wind, frames[:, 0]) * numbers["wind"]
-        yaw = numbers["yaw"] + FAN[0] * spread[0] + 0.4 * aside
-        up = numbers["ruffle"] * (0.1 + 0.6 * rand(ids, seed + 311)) + 0.45 * numbers["puff"] + 0.7 * behind
-        length = fields["length"] * numbers["length"] * (1.0 + FAN[3] * spread[3])
-        limit = _limited(fields["length"], bend_of) if skin is None else fields["limit"]
         if skin is None:
-            fields["limit"] = limit
-        length = np.maximum(length * limit, 1e-12)
-        poses = np.empty((count, POSE))
-        # what the keys' lift varies by is small beside the lift itself, or feathers would lean into the skin
-        poses[:, LIFT] = fields["lift"] * (1.0 + 0.4 * spread[1]) + numbers["lift"] + up
-        poses[:, ROLL] = numbers["roll"] * sides + FAN[2] * spread[2] * 0.5
-        poses[:, LENGTH] = length
-        curl = fields["turn"] + numbers["curl"] - 0.5 * numbers["puff"] - 0.5 * up
-        # what a vane is curved by itself follows a curved body as well
-        across, along = (self._remember("own curves", lambda: _own_curves(own), own) / length[:, None]).T
-        bend = bend_of[:, 1] - np.clip(along, 0.0, np.maximum(bend_of[:, 1], 0.0)) - curl / length
-        cup = bend_of[:, 0] - np.clip(across, 0.0, np.maximum(bend_of[:, 0], 0.0))
-        poses[:, BEND] = np.clip(bend, -1.2 / length, 1.6 / length)
-        poses[:, CUP] = np.clip(cup, -0.5 / length, 2.0 / length)
-        poses[:, TWIST] = np.clip(bend_of[:, 2], -0.6 / length, 0.6 / length)
-        frames = _turned(frames, yaw)
-        roots = positions + (ABOVE_SKIN * bed.ground.spacing[:, None] * normals).astype(np.float32)
-        feathers = Feathers(own, np.ascontiguousarray(roots, np.float32), frames, rank)
-        return Base(feathers, poses, fields, give)
+            fields["limit"] = limited(fields["length"], bend_of)
+            stand = Stand(bed.positions, rest_frames, bend_of, fields["limit"], np.full(count, GIVE))
+        else:
+            positions, frames, flow = carried(mesh, bed, rest_frames, flow_frames, skin)
+            bends = curved(positions, flow, near, ranges)
+            # where the skin bends, feathers may rise with it; elsewhere so little that nothing is seen to jump
+            give = GIVE + fields["length"] * np.abs(bends - bend_of).max(axis=1)
+            stand = Stand(positions, frames, bends, fields["limit"], give)
+        curves = self._remember("own curves", lambda: own_curves(own), own)
+        return lie_down(coat, bed, stand, numbers, fields, own, curves, rank, sides)
 
     def _directions(
         self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, bed: Bed, binding: Binding | None
@@ -263,7 +232,7 @@ class Plumage:
         if binding is not None and keys is not None and coat.direction == "keys":
             guides = keys.guides
             return self._remember(
-                "directions", lambda: _key_frames(guides, binding, bed, self._evaluator.workers.ranges),
+                "directions", lambda: key_frames(guides, binding, bed, self._evaluator.workers.ranges),
                 bed, binding, guides.points, coat.direction,
             )
         field = self._remember(
@@ -271,7 +240,7 @@ class Plumage:
             mesh, coat.direction, coat.strokes,
         )
         return self._remember(
-            "directions", lambda: _field_frames(field, bed, mesh, self._evaluator), bed, field, None, coat.direction
+            "directions", lambda: field_frames(field, bed, mesh, self._evaluator), bed, field, None, coat.direction
         )
 
     def _fields(
@@ -377,7 +346,7 @@ class Plumage:
         density = np.broadcast_to(
             values.evaluate(coat.density, frame, base.fields), len(bed.places.ids)
         )
-        shown = rand(bed.places.ids, _seed(coat) + 401) < density
+        shown = rand(bed.places.ids, seed_of(coat) + 401) < density
         return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields)
 
 
@@ -407,23 +376,6 @@ def moving(coat: FeatherCoat) -> bool:
     return any(moves(value) for value in given)
 
 
-def changed_rows(before: Base, after: Base) -> NDArray[np.int32] | None:
-    """Rows (n,) int32 whose pose, frame or vane differ; None when the feathers are others."""
-    if before.feathers.own.shape != after.feathers.own.shape:
-        return None
-    if not np.array_equal(before.feathers.roots, after.feathers.roots):
-        return None
-    differ = (before.poses != after.poses).any(axis=1)
-    differ |= (before.feathers.frames != after.feathers.frames).any(axis=(1, 2))
-    if before.feathers.own is not after.feathers.own:
-        differ |= (before.feathers.own != after.feathers.own).any(axis=(1, 2, 3))
-    return np.flatnonzero(differ).astype(np.int32)
-
-
-def _seed(coat: FeatherCoat) -> int:
-    return coat.placements[0].seed if coat.placements else 0
-
-
 def _unlayered(feathers: Feathers, poses: NDArray[np.float64], ranges: Any) -> Layered:
     vanes = pose_vanes(feathers.own, poses, feathers.roots, feathers.frames, ranges=ranges)
     none = np.zeros(0, np.int32)
@@ -433,76 +385,3 @@ def _unlayered(feathers: Feathers, poses: NDArray[np.float64], ranges: Any) -> L
 def _ordered(bed: Bed, frames: NDArray[np.float32], ranges: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     sides = smoothed(roll_sides(frames)[:, None], bed.ground.near, 3, ranges)[:, 0]
     return growth_order(bed.positions, frames, bed.ground.near, sides), sides
-
-
-def _curved(
-    positions: NDArray[np.float32], frames: NDArray[np.float32], near: NDArray[np.int32], ranges: Any
-) -> NDArray[np.float64]:
-    return smoothed(curvatures(positions, frames, near, ranges), near, 2, ranges)
-
-
-def _limited(length: NDArray[np.float64], curved: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Factor (N,) on lengths where the body bends too much below them for a feather to follow it."""
-    tight = np.maximum(np.abs(curved[:, 0]), np.abs(curved[:, 1]))
-    return np.asarray(1.0 / np.sqrt(1.0 + (length * tight / BODY) ** 2))
-
-
-def _own_curves(own: NDArray[np.float32]) -> NDArray[np.float64]:
-    """How vanes (N, R, C, 3) at length 1 curve by themselves, (N, 2), across and along, towards the skin above 0."""
-    x2, y2 = own[..., 0].astype(np.float64) ** 2, own[..., 1].astype(np.float64) ** 2
-    z = own[..., 2].astype(np.float64)
-    a, b, c = (x2 * x2).sum((1, 2)), (x2 * y2).sum((1, 2)), (y2 * y2).sum((1, 2))
-    p, q = (x2 * z).sum((1, 2)), (y2 * z).sum((1, 2))
-    rest = np.maximum(a * c - b * b, 1e-30)
-    return np.stack([-2.0 * (c * p - b * q) / rest, -2.0 * (a * q - b * p) / rest], axis=1)
-
-
-def _frames_of(directions: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Frames (N, 3, 3), rows right, along, out, of directions made square to unit normals."""
-    along = directions - normals * np.einsum("nc,nc->n", directions, normals)[:, None]
-    lost = np.linalg.norm(along, axis=1) < 1e-9
-    if lost.any():
-        helper = np.where(np.abs(normals[lost, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-        along[lost] = np.cross(normals[lost], helper)
-    along = _unit(along)
-    return np.ascontiguousarray(np.stack([np.cross(along, normals), along, normals], axis=1), np.float32)
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30))
-
-
-def _key_frames(
-    guides: Any, binding: Binding, bed: Bed, ranges: Any
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    along = interpolate_directions(key_shapes(guides), binding, bed.normals)
-    frames = _frames_of(along, bed.normals)
-    return frames, frames
-
-
-def _field_frames(
-    field: NDArray[np.float32], bed: Bed, mesh: Mesh, evaluator: Evaluator
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    corners = skin_at_rest(mesh, evaluator).triangles.vertices[bed.places.triangle]
-    along = np.einsum("nk,nkc->nc", bed.places.barycentric, field[corners]).astype(np.float64)
-    frames = _frames_of(smoothed(along, bed.ground.near, 6, evaluator.workers.ranges), bed.normals)
-    return frames, frames
-
-
-def _turned(frames: NDArray[np.float32], yaw: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Frames turned about their normals, to the right above 0."""
-    c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-    right, along = frames[:, 0], frames[:, 1]
-    turned = np.stack([c * right - s * along, c * along + s * right, frames[:, 2]], axis=1)
-    return np.ascontiguousarray(turned, np.float32)
-
-
-def _carried(
-    mesh: Mesh, bed: Bed, rest_frames: NDArray[np.float32], flow_frames: NDArray[np.float32], skin: Skin
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Positions (N, 3) and frames (N, 3, 3), twice, carried by the frames of the roots to a posed skin."""
-    moved = root_frames(mesh, bed.roots, skin.points, skin.normals)
-    turn = np.einsum("nij,nik->njk", bed.roots.frames.astype(np.float64), moved)  # rest -> posed, for rows
-    positions = root_positions(mesh, bed.roots, skin.points)
-    carried = [np.ascontiguousarray(frames @ turn, np.float32) for frames in (rest_frames, flow_frames)]
-    return positions, carried[0], carried[1]
