@@ -31,8 +31,8 @@ class History(Generic[Value]):
     """The steps of one document, for undo and redo.
 
     A value handed in is kept as it is; steps further than `keep` from the cursor are packed on a thread of their own
-    as the rows that changed, old XOR new, so they come back to the bit. When `budget` bytes are passed the oldest
-    steps are forgotten; the current one never is.
+    as the rows that changed, old XOR new, so they come back to the bit. When `budget` bytes (it may be changed) are
+    passed the oldest steps are forgotten; the current one never is.
 
     Whichever way the cursor lies, a state may lose its whole value only when the change between it and its neighbour
     towards the cursor is packed: so every state can be reached from the current one, which is always whole.
@@ -41,7 +41,7 @@ class History(Generic[Value]):
     def __init__(self, document: Value, name: str = "New", budget: int = DEFAULT_BUDGET, keep: int = 20) -> None:
         self._steps: list[_Step[Value]] = [_Step(name, document)]
         self._cursor = 0
-        self._budget = budget
+        self.budget = budget
         self._keep = keep
         self._lock = threading.Lock()
         self._packer = ThreadPoolExecutor(1, thread_name_prefix="history")
@@ -198,7 +198,7 @@ class History(Generic[Value]):
         return None
 
     def _forget(self) -> None:
-        while len(self._steps) > 1 and self._bytes() > self._budget:
+        while len(self._steps) > 1 and self._bytes() > self.budget:
             if self._cursor:
                 del self._steps[0]
                 self._cursor -= 1

@@ -108,7 +108,8 @@ def test_the_budget_forgets_the_oldest_steps_and_never_the_current_one():
     assert same_bits(history.jump(len(names) - 1), states[-1])
     history.close()
 
-    tiny = History(state, budget=1, keep=3)
+    tiny = History(state, keep=3)
+    tiny.budget = 1
     tiny.commit("Comb", states[1])
     tiny.flush()
     assert tiny.names == ("Comb",)
