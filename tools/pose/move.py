@@ -30,6 +30,7 @@ from tools.pose.posing import (
     pick,
     selected,
     towards_eye,
+    with_handles,
 )
 from tools.tool import Pointer, Stroke, Tool, Turn
 
@@ -64,17 +65,17 @@ class Move(Tool[MoveParams]):
     def begin(self, ground: PoseGround, pointer: Pointer) -> Stroke[Posing]:
         """A move where an arrow is pressed, else the pick of a joint; UserError where there is neither."""
         joints, selection = joints_of(ground, ground.pose), selected(ground)
-        arrow = arrow_under(ground, joints, selection, self.params, pointer)
+        arrow = arrow_under(ground, joints, self.params, pointer)
         if arrow is not None:
             return MoveStroke(ground, selection, joints, arrow, self.params, pointer)
         return pick(ground, joints, self.params, pointer)
 
     def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
         """The arrows of the active joint, that under the pointer brighter, else the joint that a click would pick."""
-        joints, selection = joints_of(ground, ground.pose), selected(ground)
-        under = arrow_under(ground, joints, selection, self.params, pointer)
+        joints = joints_of(ground, ground.pose)
+        under = arrow_under(ground, joints, self.params, pointer)
         picked = joint_under(ground, joints, pointer) if under is None else None
-        return arrows(ground, joints, selection, self.params, under) + meant(ground, joints, picked)
+        return arrows(ground, joints, self.params, under) + meant(ground, joints, picked)
 
 
 class MoveStroke(PosingStroke):
@@ -156,13 +157,11 @@ def arrow_ends(ground: PoseGround, joints: Joints, joint: int, params: Manipulat
 
 
 def arrow_under(
-    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, pointer: Pointer
+    ground: PoseGround, joints: Joints, params: ManipulatorParams, pointer: Pointer
 ) -> int | None:
     """The arrow of the active joint that a pointer is on: 0, 1, 2, or 3 for the ring in the middle."""
-    if not selection:
-        return None
-    joint = ground.rig.skeleton.names.index(selection[-1])
-    if not joints.seen[joint]:
+    joint = with_handles(ground, joints)
+    if joint is None:
         return None
     place, middle = np.array([pointer.x, pointer.y]), joints.pixels[joint]
     if np.linalg.norm(place - middle) <= HANDLE:
@@ -176,13 +175,11 @@ def arrow_under(
 
 
 def arrows(
-    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, under: int | None
+    ground: PoseGround, joints: Joints, params: ManipulatorParams, under: int | None
 ) -> Overlays:
     """The arrows of the active joint, the one that is meant thicker."""
-    if not selection:
-        return ()
-    joint = ground.rig.skeleton.names.index(selection[-1])
-    if not joints.seen[joint]:
+    joint = with_handles(ground, joints)
+    if joint is None:
         return ()
     middle = joints.pixels[joint]
     drawn: list[Overlay] = []

@@ -93,6 +93,13 @@ def selected(ground: PoseGround) -> tuple[str, ...]:
     return tuple(n for n in ground.item.joint_selection if n in ground.rig.skeleton.names)
 
 
+def with_handles(ground: PoseGround, joints: Joints) -> int | None:
+    """The joint that handles are at: the one selected last, where it is in front of the eye."""
+    selection = selected(ground)
+    joint = ground.rig.skeleton.names.index(selection[-1]) if selection else None
+    return joint if joint is not None and joints.seen[joint] else None
+
+
 def frame_of(joints: Joints, joint: int, axes: str) -> Array:
     """Unit axes (3, 3) as columns, object space, along which the handles of a joint lie."""
     return np.eye(3) if axes == "world" else polar_rotation(joints.world[joint, :3, :3])

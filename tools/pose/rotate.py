@@ -31,6 +31,7 @@ from tools.pose.posing import (
     pick,
     selected,
     towards_eye,
+    with_handles,
 )
 from tools.tool import Pointer, Stroke, Tool, Turn
 
@@ -67,17 +68,17 @@ class Rotate(Tool[RotateParams]):
     def begin(self, ground: PoseGround, pointer: Pointer) -> Stroke[Posing]:
         """A turn where a ring is pressed, else the pick of a joint; UserError where there is neither."""
         joints, selection = joints_of(ground, ground.pose), selected(ground)
-        ring = ring_under(ground, joints, selection, self.params, pointer)
+        ring = ring_under(ground, joints, self.params, pointer)
         if ring is not None:
             return RotateStroke(ground, selection, joints, ring, self.params, pointer)
         return pick(ground, joints, self.params, pointer)
 
     def hover(self, ground: PoseGround, pointer: Pointer) -> Overlays:
         """The rings of the active joint, the one under the pointer brighter, else the joint that a click would pick."""
-        joints, selection = joints_of(ground, ground.pose), selected(ground)
-        under = ring_under(ground, joints, selection, self.params, pointer)
+        joints = joints_of(ground, ground.pose)
+        under = ring_under(ground, joints, self.params, pointer)
         picked = joint_under(ground, joints, pointer) if under is None else None
-        return rings(ground, joints, selection, self.params, under) + meant(ground, joints, picked)
+        return rings(ground, joints, self.params, under) + meant(ground, joints, picked)
 
 
 class RotateStroke(PosingStroke):
@@ -179,13 +180,11 @@ def ring_points(ground: PoseGround, joints: Joints, joint: int, params: Manipula
 
 
 def ring_under(
-    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, pointer: Pointer
+    ground: PoseGround, joints: Joints, params: ManipulatorParams, pointer: Pointer
 ) -> int | None:
     """The ring of the active joint that a pointer is on: 0, 1, 2, or 3 for the one about the line of sight."""
-    if not selection:
-        return None
-    joint = ground.rig.skeleton.names.index(selection[-1])
-    if not joints.seen[joint]:
+    joint = with_handles(ground, joints)
+    if joint is None:
         return None
     place = np.array([pointer.x, pointer.y])
     away = [_distance(place, points) for points in ring_points(ground, joints, joint, params)]
@@ -202,13 +201,11 @@ def _distance(place: Array, points: Array) -> float:
 
 
 def rings(
-    ground: PoseGround, joints: Joints, selection: tuple[str, ...], params: ManipulatorParams, under: int | None
+    ground: PoseGround, joints: Joints, params: ManipulatorParams, under: int | None
 ) -> Overlays:
     """The rings of the active joint, thin on their far side, the one that is meant thick; their names beside them."""
-    if not selection:
-        return ()
-    joint = ground.rig.skeleton.names.index(selection[-1])
-    if not joints.seen[joint]:
+    joint = with_handles(ground, joints)
+    if joint is None:
         return ()
     x, y = map(float, joints.pixels[joint])
     frame, eye = frame_of(joints, joint, params.axes), towards_eye(ground, joints.world[joint, :3, 3])
