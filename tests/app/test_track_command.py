@@ -68,6 +68,34 @@ def test_features_are_found_by_themselves_and_masks_hold_them_off(plate, tmp_pat
     assert min(track["points"][0][1] for track in json.loads(out.read_text())["tracks"]) > 80
 
 
+def test_a_plate_becomes_a_camera_in_one_command(plate, tmp_path):
+    from pxr import Usd, UsdGeom
+
+    out, page = tmp_path / "shot.usda", tmp_path / "solve.html"
+    code, words, error = filoplume(
+        "track", plate, "--auto", "30", "--solve", "--focal-px", "160", "-o", out, "--solve-report", page, "--json")
+    assert code == 0, error
+    solved = json.loads(words)["solve"]
+    assert {"cameras", "points", "observations", "rms_px", "median_px", "focal_px", "focal_sigma_px", "keyframes",
+            "kind", "warnings", "advice"} <= solved.keys()
+    assert solved["cameras"] == 6
+    assert "<svg" in page.read_text()
+    stage = Usd.Stage.Open(str(out))
+    (camera,) = [UsdGeom.Camera(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Camera)]
+    (points,) = [UsdGeom.Points(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Points)]
+    places = np.array(points.GetPointsAttr().Get(), float)
+
+    def seen(frame):
+        lens = camera.GetCamera(frame)
+        there = np.c_[places, np.ones(len(places))] @ np.array(lens.transform.GetInverse())
+        flat = there[:, :2] / -there[:, 2:3] * lens.focalLength / lens.horizontalAperture * 160
+        return flat * [1, -1] + [79.5, 59.5]
+
+    first, last = seen(1001), seen(1008)
+    wanted = np.array([place(point, 7) for point in first])
+    assert np.median(np.linalg.norm(last - wanted, axis=1)) < 0.3
+
+
 def test_what_cannot_be_done_is_said(plate, tmp_path):
     keys = tmp_path / "in.json"
     keys.write_text(json.dumps({"size": [100, 100], "tracks": [{"name": "a", "points": [[1, 2, 3]]}]}))

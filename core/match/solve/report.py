@@ -10,7 +10,7 @@ from core.errors import UserError
 from core.match.solve.certainty import Certainty, Fix, Test
 from core.match.solve.nodal import BY_CHANCE, parallax
 from core.match.solve.solve import Solution
-from core.match.solve.state import FOCAL, FRAME_FOCAL, Array, Rows, residuals
+from core.match.solve.state import FOCAL, FRAME_FOCAL, K1, LENS_NAMES, Array, Rows, residuals
 
 GAIN = 30.0  # of the squares over the variance: a fixed parameter is wrong
 NOISE, TOO_NOISY = 1.3, 3.0  # residuals over the noise of the tracks: said; refused
@@ -132,9 +132,11 @@ def _warnings(
             "nearer and farther would tell it." if FRAME_FOCAL in solution.free.frame else
             f"The focal length is known to {100 * sigma_f:.1f} % only; give it if you know it.")
     if any(test.name == TRANSLATION and test.gain for test in tests):
+        bends = next((test for test in tests if test.name == LENS_NAMES[K1] and test.gain > GAIN), None)
         said.append(
             "The camera moves a little, as the parallax of the tracks shows: solved as one that only turns, its "
-            "rotations are off by that. Add tracks that are near, so that the path can be told.")
+            "rotations are off by that. Add tracks that are near, so that the path can be told."
+            + (f" A lens that bends looks alike, k1 about {bends.better:+.4f}; solve with a lens." if bends else ""))
         tests = ()  # what the lens seems to do is what that movement does
     strong = [test for test in tests if test.gain > GAIN]
     for test in sorted(strong, key=lambda one: -one.gain)[:2]:

@@ -42,9 +42,10 @@ FOCALS = (0.7, 1.0, 1.6, 2.8)  # of the width of the picture, where nobody knows
 OUTLIER = 4.5  # standard deviations
 PICKED = 1.0 / 2000.0  # of the width of a photograph: noise of what was seen in photographs alone
 WILD = 0.005  # of the width of the picture: noise no tracker makes
+TOGETHER = 2e-3  # of the width of the picture: tracks so near to each other are one place
 HYPOTHESES = 6
 RAMPS = (0.35, -0.35)  # of the logarithm of the focal length from the first frame to the last
-RAMPED = 0.9  # of the residuals: such a zoom explains more
+RAMPED = 0.9  # of the residuals: such a zoom or bend explains more
 LEFT_OUT, WANDERS = 0.1, 0.1  # share of the tracks that do not fit, and correlation of what the others miss by
 ROUNDS_OUT = 5  # of leaving out what does not fit; two, and more while slow slides are found
 ROUNDS, REFOCUSED = 2, 0.002  # of a camera whose distortion was taken out at a focal length that moved by this part
@@ -145,7 +146,7 @@ def solve(
     views = views._replace(cameras=(
         views.cameras[0]._replace(focal=options.focal, found=options.free_focal), *views.cameras[1:]))
     check(views)
-    _check(observations, frames, tracks, alone=bool(views.alone.all()))
+    _check(observations, frames, tracks, views)
     if options.focal is not None or options.nodal:
         guesses = [options.focal or float(size[0])]
     else:
@@ -190,6 +191,14 @@ def _best(
     doubtful = start.doubt > ACCEPT or missing
     if start.kind == "nodal" or not doubtful or views.alone.any() or len(views.cameras) > 1:
         return found
+    if not (options.distortion or options.zoom):
+        other = _Problem(
+            observations, frames, tracks, size, options._replace(distortion=True), views, problem.focal, progress)
+        began = other.begin()
+        if began.doubt < np.inf:
+            bent = other.finish(began)
+            said = f"The lens bends lines: k1 {bent.state.lens[K1]:+.4f} was found, which nobody asked for."
+            found = bent._replace(said=(*bent.said, said)) if _better(bent, found) else found
     # a dolly zoom lies far from any path at one focal length: begin at zooms of an even pace
     likely: tuple[_Start, _Problem] | None = None
     for ramp in RAMPS:
@@ -202,9 +211,13 @@ def _best(
         return found
     said = "The focal length changes over the shot: it was solved with a zoom, which nobody asked for."
     zoomed = likely[1].finish(likely[0]._replace(said=() if options.zoom else (said,)))
-    fewer = _left_out(zoomed) < 0.5 * _left_out(found) and zoomed.sigma < 1.05 * found.sigma
-    nearer = _left_out(zoomed) < _left_out(found) + 0.02 and zoomed.sigma < RAMPED * found.sigma
-    return zoomed if fewer or nearer else found
+    return zoomed if _better(zoomed, found) else found
+
+
+def _better(richer: Solution, found: Solution) -> bool:
+    """Whether a lens with more parameters leaves out far fewer tracks, or misses the same ones by less."""
+    fewer = _left_out(richer) < 0.5 * _left_out(found) and richer.sigma < 1.05 * found.sigma
+    return fewer or (_left_out(richer) < _left_out(found) + 0.02 and richer.sigma < RAMPED * found.sigma)
 
 
 def _left_out(found: Solution) -> float:
@@ -230,17 +243,39 @@ def _noise(observations: Observations, views: Views, size: tuple[int, int]) -> t
     return pixels, True
 
 
-def _check(observations: Observations, frames: Rows, tracks: int, *, alone: bool) -> None:
+def _check(observations: Observations, frames: Rows, tracks: int, views: Views) -> None:
     if len(frames) < 2:
         raise UserError("The tracks are on one frame only; a camera needs two frames at least, better twenty.")
     if not np.isfinite(observations.xy).all():
         raise UserError("The tracks hold places that are not numbers; track them again.")
+    if len(views.cameras) == 1:
+        _check_places(observations, views.cameras[0].size)
     long = np.bincount(observations.track, minlength=tracks) >= 2
-    least = LEAST_PICKS if alone else LEAST_TRACKS
+    least = LEAST_PICKS if views.alone.all() else LEAST_TRACKS
     if long.sum() < least:
         raise UserError(
             f"{int(long.sum())} tracks are seen on two frames or more; a camera needs {least} at least, better "
             "twenty, spread over the picture and over near and far."
+        )
+
+
+def _check_places(observations: Observations, size: tuple[int, int]) -> None:
+    """Raise UserError when tracks are not of a picture of `size`, or all at one place of it."""
+    low, high = np.quantile(observations.xy, [0.25, 0.75], axis=0)
+    if (high < -0.5).any() or (low > np.array(size) - 0.5).any() or (high - low > 2.0 * np.array(size)).any():
+        raise UserError(
+            f"Most tracks lie outside of a plate of {size[0]} x {size[1]} pixels; give the size of their own plate."
+        )
+    count = np.bincount(observations.frame)
+    spread = np.zeros(2)
+    for axis in range(2):
+        places = observations.xy[:, axis]
+        mean = np.bincount(observations.frame, places) / np.maximum(count, 1)
+        spread[axis] = np.sqrt(np.mean((places - mean[observations.frame]) ** 2))
+    if np.hypot(*spread) < TOGETHER * size[0]:
+        raise UserError(
+            f"The tracks all lie within {4.0 * np.hypot(*spread):.1f} px of each other; a camera needs them spread "
+            "over the picture."
         )
 
 
@@ -253,6 +288,16 @@ class _Start(NamedTuple):
     lens_columns: tuple[int, ...]
     zoom: bool
     said: tuple[str, ...]
+
+    @property
+    def richness(self) -> tuple[bool, int]:
+        """See :func:`_richness`."""
+        return _richness(self.lens_columns, self.zoom)
+
+
+def _richness(columns: tuple[int, ...], zoom: bool) -> tuple[bool, int]:
+    """Orders what may be free by how much that is: a bend is one number, a zoom as many as there are frames."""
+    return zoom, len(columns)
 
 
 class _Problem:
@@ -319,7 +364,7 @@ class _Problem:
         best: _Start | None = None
         rows = np.asarray(self.keys)
         for columns, zoom in self._lenses(free):
-            if best is not None and best.doubt < WORSE and not (self.options.zoom and zoom):
+            if best is not None and best.doubt < WORSE and _richness(columns, zoom) > best.richness:
                 continue
             done = solve_nodal(
                 self.part, len(self.keys), self.tracks, lens, self.pixels, scale=2.5 * self.noise,
@@ -328,7 +373,7 @@ class _Problem:
             if done is None:
                 continue
             doubt = self._doubt(done.state, self.part)
-            if best is None or doubt < GAIN * best.doubt or (self.options.zoom and zoom):
+            if best is None or doubt < best.doubt * (GAIN if _richness(columns, zoom) > best.richness else 1.0):
                 cameras = Cameras(done.state, np.ones(len(self.keys), bool), np.ones(self.tracks, bool))
                 best = _Start(doubt, "nodal", cameras, columns, zoom, self._changed(done.state, columns, zoom, free))
         return best
@@ -340,9 +385,12 @@ class _Problem:
             zoom, richer = self.options.zoom, (K1,)
             return [(bent, zoom)] if bent else [(bent, zoom), (richer, zoom)]
         asked = ((FOCAL,) if free else ()) + bent
-        tries = [(asked, False), (tuple(sorted({FOCAL, *asked})), False)]
-        tries.append((tuple(c for c in asked if c != FOCAL), True))
-        tries.append((tuple(sorted({FOCAL, K1, *asked})), False))
+        rigid = tuple(c for c in asked if c != FOCAL)
+        if self.options.zoom:
+            return [(rigid, True)]
+        added: tuple[tuple[int, ...], ...] = ((), (FOCAL,), (K1,), (FOCAL, K1))
+        models = [tuple(sorted({*more, *asked})) for more in added]
+        tries = [*((columns, False) for columns in models), (rigid, True)]
         return [one for k, one in enumerate(tries) if one not in tries[:k]]
 
     def _changed(self, state: State, columns: tuple[int, ...], zoom: bool, free: bool) -> tuple[str, ...]:
@@ -384,12 +432,15 @@ class _Problem:
         """The lens with no more parameters than the tracks ask for."""
         best: _Start | None = None
         for columns, zoom in self._lenses(free):
-            if best is not None and best.doubt < WORSE and not (self.options.zoom and zoom):
+            if best is not None and best.doubt < WORSE and _richness(columns, zoom) > best.richness:
                 continue
             tied = self._tied(np.asarray(self.keys)[cameras.known], zoom=zoom)
             other = grower.adjusted(cameras, columns, tied) if columns or tied is not None else cameras
             doubt = self._key_doubt(other)
-            if best is None or doubt < GAIN * best.doubt or (self.options.zoom and zoom):
+            if other is not cameras and doubt > ACCEPT:  # what did not fit at the beginning counts less now
+                other = grower.adjusted(other, columns, tied)
+                doubt = self._key_doubt(other)
+            if best is None or doubt < best.doubt * (GAIN if _richness(columns, zoom) > best.richness else 1.0):
                 best = _Start(doubt, "free", other, columns, zoom, self._changed(other.state, columns, zoom, free))
         assert best is not None
         return best

@@ -90,6 +90,14 @@ def test_a_bend_of_the_lens_nobody_declared_is_said_and_can_be_found():
     assert not report(found, _names(made)).warnings
 
 
+def test_a_strong_bend_nobody_declared_is_found_and_taken_for_no_zoom():
+    made = shot("orbit", 40, seed=2, k1=-0.12)
+    found = solve(made.observations, made.frames, 40, SIZE, Options(FOCAL))
+    assert found.state.lens[1] == pytest.approx(-0.12, abs=0.006)
+    assert any("lens bends lines" in words for words in found.said)
+    assert not any("zoom" in words for words in found.said)
+
+
 def test_of_two_motions_one_is_left_out_and_that_is_said():
     made, other = shot("orbit", 30, seed=1), shot("forward", 30, seed=5)
     second = other.observations._replace(track=other.observations.track + 30)
@@ -107,6 +115,10 @@ def _garbage():
     return [keyed_track(k, f"t{k}", np.column_stack([np.arange(20), rng.uniform(0, 1000, (20, 2))])) for k in range(20)]
 
 
+def _moved(tracks, scale, shift):
+    return [track.replace(points=scale * track.points + shift) for track in tracks]
+
+
 @pytest.mark.parametrize(
     ("tracks", "words"),
     [
@@ -114,6 +126,8 @@ def _garbage():
         ([keyed_track(k, "t", np.array([[1.0, 10 * k, 5.0]])) for k in range(20)], "one frame"),
         ([keyed_track(k, "t", np.array([[1.0, 10 * k, 5.0], [2.0, 10 * k + 1, 5.0]])) for k in range(3)], "needs 8"),
         (_garbage(), "jump about"),
+        (_moved(_garbage(), 1e-4, 500.0), "of each other"),
+        (_moved(_garbage(), 1.0, -3000.0), "outside of a plate"),
     ],
 )
 def test_what_no_camera_explains_is_refused_in_words(tracks, words):
