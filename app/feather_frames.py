@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
@@ -50,9 +52,9 @@ def worse(one: Figures, other: Figures) -> Figures:
 
 
 def export_frame(
-    laid: Laid, frame: float, each: bool, evaluator: Evaluator, still: bool = True
+    laid: Laid, frame: float, each: bool, evaluator: Evaluator, added: NDArray[np.float64] | None = None
 ) -> tuple[FeatherFrame, Figures]:
-    """One frame as it is written, and what crosses in it; `still` when it is not one of many."""
+    """One frame as it is written, and what crosses in it; `added` (``added_at_rest``) where it is one of many."""
     rows = shown_rows(laid)
     attributes = {name: laid.fields[name][rows] for name in EXPORTED if name in laid.fields}
     figures: Figures
@@ -61,7 +63,7 @@ def export_frame(
         made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], laid.layered.vanes[rows], attributes)
         figures = {}
     else:
-        found = instances(laid, evaluator.workers, still)
+        found = instances(laid, evaluator.workers, added)
         left = found.left
         made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
         figures = {

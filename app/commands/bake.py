@@ -17,6 +17,7 @@ from app.report import Report, peak_megabytes
 from core.document import find_mesh, keys_of
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.coat.export import added_at_rest
 from core.feather.coat.plumage import Plumage
 from core.formats.atomic import atomic_write
 from core.formats.curve_file import maker
@@ -84,6 +85,9 @@ class _Coat:
         self.document = read_project(file).document
         self.coat = next(coat for coat in self.document.feathers if coat.id == coat_id)
         self.plumage = Plumage(self.evaluator)
+        item, keys = find_mesh(self.document, self.coat.mesh_id), keys_of(self.document, self.coat)
+        rest = self.plumage.at_rest(self.coat, keys, item.mesh, float(self.document.first_frame))
+        self.added = added_at_rest(rest, self.evaluator.workers)
 
 
 @functools.lru_cache(maxsize=1)
@@ -100,7 +104,7 @@ def bake_frame(job: Job) -> Figures:
     skin = posed_document(kept.document, float(frame), kept.evaluator)[item.id]
     laid = kept.plumage.at_frame(
         kept.coat, keys_of(kept.document, kept.coat), item.mesh, skin, float(frame), float(kept.document.first_frame))
-    written, figures = export_frame(laid, float(frame), each, kept.evaluator, still=False)
+    written, figures = export_frame(laid, float(frame), each, kept.evaluator, kept.added)
     with atomic_write(path) as temporary:
         writer = FeatherWriter(
             temporary, kept.coat.name, item.mesh, maker(), MATERIAL, True, kept.document.fps)

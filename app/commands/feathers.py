@@ -16,6 +16,7 @@ from core.errors import UserError
 from core.evaluator import Evaluator
 from core.feather.coat.coat import PLACEMENTS
 from core.feather.coat.dress import KEYS, Dressed, dress_feathers
+from core.feather.coat.export import added_at_rest
 from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Laid, Plumage
 from core.formats import rig_file
@@ -63,7 +64,7 @@ def command(
         with report.stage("place", "setting feathers"):
             plumage.bed(dressed.coat, dressed.keys, item.mesh)
         with report.stage("layer", "laying feathers over one another"):
-            rest = plumage.at_rest(dressed.coat, dressed.keys, item.mesh)
+            rest = plumage.at_rest(dressed.coat, dressed.keys, item.mesh, float(document.first_frame))
         found = _written(output, document, dressed, plumage, rest, wanted, each, evaluator, report)
     result = {
         "keys": len(dressed.keys.guides), **found, "seconds": report.seconds, "peak_mb": peak_megabytes(),
@@ -120,13 +121,15 @@ def _written(
             writers.append(FeatherWriter(
                 temporary, dressed.coat.name, item.mesh, maker(), MATERIAL, wanted is not None,
                 document.fps))
+        start = float(document.first_frame)
+        added = None if wanted is None or each else added_at_rest(rest, evaluator.workers)
         for frame in numbers:
             with report.stage("frames", f"frame {frame}"):
                 laid = rest
                 if wanted is not None:
                     skin: Skin = posed_document(document, float(frame), evaluator)[item.id]
-                    laid = plumage.at_frame(dressed.coat, dressed.keys, item.mesh, skin, float(frame))
-                written, made = export_frame(laid, frame, each, evaluator, wanted is None)
+                    laid = plumage.at_frame(dressed.coat, dressed.keys, item.mesh, skin, float(frame), start)
+                written, made = export_frame(laid, frame, each, evaluator, added)
             figures = worse(figures, made)
             with report.stage("export", f"writing frame {frame}"):
                 for writer in writers:

@@ -18,6 +18,7 @@ from core.random import rand
 
 BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
 GIVE = np.radians(1.2)  # by which a frame may lift a feather where the skin does not bend
+YIELD = 1.0  # radians beyond that for a unit of stretch and shear
 ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
 FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
 
@@ -111,6 +112,24 @@ def limited(length: NDArray[np.float64], bend: NDArray[np.float64]) -> NDArray[n
     """Factor (N,) on lengths where the body bends too much below them for a feather to follow it."""
     tight = np.maximum(np.abs(bend[:, 0]), np.abs(bend[:, 1]))
     return np.asarray(1.0 / np.sqrt(1.0 + (length * tight / BODY) ** 2))
+
+
+def strained(
+    rest: NDArray[np.float32], rest_frames: NDArray[np.float32], posed: NDArray[np.float32],
+    posed_frames: NDArray[np.float32], near: NDArray[np.int32],
+) -> NDArray[np.float64]:
+    """How far the neighbours of N roots moved about them, (N,) float64, over how far they stood: stretch and shear.
+
+    rest, posed : (N, 3) positions, with their frames (N, 3, 3). near : (N, K) int32, -1 where there is none.
+    """
+    there = near >= 0
+    offsets = [
+        np.einsum("nij,nkj->nki", frames, points[near].astype(np.float64) - points[:, None])
+        for points, frames in ((rest, rest_frames), (posed, posed_frames))
+    ]
+    moved = np.where(there, np.linalg.norm(offsets[1] - offsets[0], axis=2), 0.0).sum(axis=1)
+    stood = np.where(there, np.linalg.norm(offsets[0], axis=2), 0.0).sum(axis=1)
+    return np.asarray(moved / np.maximum(stood, 1e-30))
 
 
 def own_curves(own: NDArray[np.float32]) -> NDArray[np.float64]:

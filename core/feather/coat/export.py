@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from core.feather.coat.base import GIVE
 from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
 from core.feather.coat.plumage import Laid
@@ -61,41 +60,50 @@ def left_crossing(laid: Laid, workers: Workers) -> Crossings:
     return crossings(kept, laid.skin.bvh, workers)
 
 
-def instances(laid: Laid, workers: Workers, still: bool = True) -> Instances:
+class _Rigid(NamedTuple):
+    """Feathers as rigid copies before they settle: bins (B, 7) of shapes, `which` of them each is, poses (N, 6).
+
+    vanes : (B, R, C, 3) float32, of the shapes. feathers : those of the copies.
+    """
+
+    bins: NDArray[np.int32]
+    which: NDArray[np.int64]
+    vanes: NDArray[np.float32]
+    feathers: Feathers
+    poses: NDArray[np.float64]
+
+
+def added_at_rest(rest: Laid, workers: Workers) -> NDArray[np.float64]:
+    """What settling the copies at rest adds to lift and roll and makes of length, (N, 3), by rows of the bed.
+
+    Every frame begins from it, so that a frame need only lift what newly crosses.
+    """
+    rows = shown_rows(rest)
+    rigid = _rigid(rest, rows, workers)
+    settled = _settled(rigid, rigid.poses, rest, workers, None).poses
+    added = np.tile([0.0, 0.0, 1.0], (len(rest.ids), 1))
+    added[rows, :2] = settled[:, [LIFT, ROLL]] - rigid.poses[:, [LIFT, ROLL]]
+    added[rows, 2] = settled[:, LENGTH] / rigid.poses[:, LENGTH]
+    return added
+
+
+def instances(laid: Laid, workers: Workers, added: NDArray[np.float64] | None = None) -> Instances:
     """The feathers shown as instances of quantised shapes.
 
-    still : the coat is written once; in a frame of an animation feathers are only lifted, and by little, so that
-        nothing jumps from frame to frame.
+    added : for a frame of an animation, ``added_at_rest``: feathers are then only lifted beyond it, and by little, so
+        that nothing jumps from frame to frame. None where the coat is written once.
     """
     rows = shown_rows(laid)
-    poses = laid.layered.poses[rows]
-    length = poses[:, LENGTH]
-    turning = poses[:, [BEND, CUP, TWIST]] * length[:, None]
     own = laid.feathers.own[rows]
-    middle = own.shape[2] // 2
-    outline = np.column_stack([
-        own[..., 0].min(axis=(1, 2), initial=0.0), own[..., 0].max(axis=(1, 2), initial=0.0), own[:, -1, middle, 0],
-        own[:, -1, middle, 2],
-    ])
-    keys = np.column_stack([np.round(turning / STEPS), np.round(outline / OUTLINE_STEP)]).astype(np.int32)
-    bins, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    which = which.reshape(-1)
-    shapes = np.zeros((len(bins), POSE))
-    shapes[:, [BEND, CUP, TWIST]] = bins[:, :3] * STEPS
-    shapes[:, LENGTH] = 1.0
-    outlines = np.ascontiguousarray(own[first])
-    upright = np.broadcast_to(np.eye(3, dtype=np.float32), (len(bins), 3, 3)).copy()
-    vanes = pose_vanes(outlines, shapes, np.zeros((len(bins), 3), np.float32), upright, ranges=workers.ranges)
-    error = _error(own, turning, vanes, which, workers)
-    rigid = np.zeros((len(rows), POSE))
-    rigid[:, [LIFT, ROLL, LENGTH]] = poses[:, [LIFT, ROLL, LENGTH]]
-    feathers = Feathers(
-        np.ascontiguousarray(vanes[which]), np.ascontiguousarray(laid.feathers.roots[rows]),
-        np.ascontiguousarray(laid.feathers.frames[rows]), np.ascontiguousarray(laid.feathers.rank[rows]),
-    )
-    near = np.full((len(rows), 1), -1, np.int32)  # nobody follows: each has its place already
-    give = None if still else np.full(len(rows), GIVE)
-    settled = layer(feathers, rigid, near, laid.skin.bvh, workers, may_shorten=still, bent_back=0.0, most=give)
+    rigid = _rigid(laid, rows, workers)
+    bins, which, vanes = rigid.bins, rigid.which, rigid.vanes
+    error = _error(own, _turning(laid, rows), vanes, which, workers)
+    poses = rigid.poses.copy()
+    if added is not None:
+        poses[:, [LIFT, ROLL]] += added[rows, :2]
+        poses[:, LENGTH] *= added[rows, 2]
+    settled = _settled(rigid, poses, laid, workers, None if added is None else laid.give[rows])
+    feathers = rigid.feathers
     turns = quaternions(feathers.frames, settled.poses).astype(np.float32)
     scales = settled.poses[:, LENGTH].astype(np.float32)
     written = _instanced(feathers.own, feathers.roots, turns, scales)
@@ -105,9 +113,49 @@ def instances(laid: Laid, workers: Workers, still: bool = True) -> Instances:
         for v in (written, rounded)
     )
     return Instances(
-        laid.ids[rows], keys, feathers.roots, turns, scales,
+        laid.ids[rows], bins[which], feathers.roots, turns, scales,
         {tuple(int(v) for v in key): vanes[k] for k, key in enumerate(bins)}, error, left, coarse, written,
     )
+
+
+def _turning(laid: Laid, rows: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Radians (N, 3) that the feathers of `rows` are bent, cupped and twisted by over their length."""
+    poses = laid.layered.poses[rows]
+    return np.asarray(poses[:, [BEND, CUP, TWIST]] * poses[:, LENGTH, None])
+
+
+def _rigid(laid: Laid, rows: NDArray[np.int32], workers: Workers) -> _Rigid:
+    own, poses = laid.feathers.own[rows], laid.layered.poses[rows]
+    middle = own.shape[2] // 2
+    outline = np.column_stack([
+        own[..., 0].min(axis=(1, 2), initial=0.0), own[..., 0].max(axis=(1, 2), initial=0.0), own[:, -1, middle, 0],
+        own[:, -1, middle, 2],
+    ])
+    keys = np.column_stack([
+        np.round(_turning(laid, rows) / STEPS), np.round(outline / OUTLINE_STEP)]).astype(np.int32)
+    bins, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    shapes = np.zeros((len(bins), POSE))
+    shapes[:, [BEND, CUP, TWIST]] = bins[:, :3] * STEPS
+    shapes[:, LENGTH] = 1.0
+    outlines = np.ascontiguousarray(own[first])
+    upright = np.broadcast_to(np.eye(3, dtype=np.float32), (len(bins), 3, 3)).copy()
+    vanes = pose_vanes(outlines, shapes, np.zeros((len(bins), 3), np.float32), upright, ranges=workers.ranges)
+    rigid = np.zeros((len(rows), POSE))
+    rigid[:, [LIFT, ROLL, LENGTH]] = poses[:, [LIFT, ROLL, LENGTH]]
+    feathers = Feathers(
+        np.ascontiguousarray(vanes[which]), np.ascontiguousarray(laid.feathers.roots[rows]),
+        np.ascontiguousarray(laid.feathers.frames[rows]), np.ascontiguousarray(laid.feathers.rank[rows]),
+    )
+    return _Rigid(bins, which, vanes, feathers, rigid)
+
+
+def _settled(
+    rigid: _Rigid, poses: NDArray[np.float64], laid: Laid, workers: Workers, most: NDArray[np.float64] | None
+) -> Layered:
+    near = np.full((len(poses), 1), -1, np.int32)  # nobody follows: each has its place already
+    return layer(
+        rigid.feathers, poses, near, laid.skin.bvh, workers, may_shorten=most is None, bent_back=0.0, most=most)
 
 
 def _error(

@@ -19,42 +19,46 @@ STREAKS = 0.3  # by which barbs differ in brightness
 LOOSE = 0.45  # of the way from shaft to edge, and of the length at the tip: where barbs begin to come loose
 
 
-def coat_meshes(laid: Laid, coat: FeatherCoat) -> tuple[FeatherMesh, ...]:
-    """The feathers shown as triangles in space, metres: one mesh for each preset the parts of the bird wear."""
+def coat_meshes(laid: Laid, coat: FeatherCoat, grid: tuple[int, int] = (ROWS, COLUMNS)) -> tuple[FeatherMesh, ...]:
+    """The feathers shown as triangles in space, metres: one mesh for each preset the parts of the bird wear.
+
+    grid : rows and columns of a vane, an odd number of columns.
+    """
     worn = load_bird(coat.preset).feathers
     names = np.array([worn["body"], *(worn.get(tract.name, worn["body"]) for tract in coat.tracts)])
     rows = np.flatnonzero(laid.shown)
     wears = names[laid.bed.tract[rows].astype(np.intp)]
-    return tuple(_worn(laid, rows[wears == name], preset_values(str(name))) for name in np.unique(wears))
+    return tuple(_worn(laid, rows[wears == name], preset_values(str(name)), grid) for name in np.unique(wears))
 
 
-def _worn(laid: Laid, rows: NDArray[np.intp], values: Floats) -> FeatherMesh:
+def _worn(laid: Laid, rows: NDArray[np.intp], values: Floats, grid: tuple[int, int]) -> FeatherMesh:
     """Feathers of one preset; feathers of a variant share the seed of their pattern."""
     variant = laid.ids[rows] % VARIANTS
     return joined([
-        _alike(laid, rows[variant == seed], values, int(seed)) for seed in np.unique(variant)
+        _alike(laid, rows[variant == seed], values, int(seed), grid) for seed in np.unique(variant)
     ])
 
 
-def _alike(laid: Laid, rows: NDArray[np.intp], values: Floats, seed: int) -> FeatherMesh:
+def _alike(laid: Laid, rows: NDArray[np.intp], values: Floats, seed: int, size: tuple[int, int]) -> FeatherMesh:
+    down, wide = size
     coarse = laid.layered.vanes[rows].astype(np.float64)
-    up, across = _spline(coarse.shape[1], ROWS), _spline(coarse.shape[2], COLUMNS)
+    up, across = _spline(coarse.shape[1], down), _spline(coarse.shape[2], wide)
     grid = np.einsum("ar,nrcx,bc->nabx", up, coarse, across, optimize=True)
     own = np.einsum("ar,rcx,bc->abx", up, laid.feathers.own[rows].mean(axis=0, dtype=np.float64), across)
     outward = np.gradient(grid, axis=2)
-    outward[:, :, : COLUMNS // 2] *= -1.0
+    outward[:, :, : wide // 2] *= -1.0
     along = np.gradient(grid, axis=1)
     normals = np.cross(np.gradient(grid, axis=2), along)
     normals *= np.sign(np.einsum("nabx,nx->nab", normals, laid.feathers.frames[rows][:, 2]))[..., None]
-    count, size = len(rows), ROWS * COLUMNS
-    side = np.repeat((np.arange(COLUMNS) >= COLUMNS // 2)[None], ROWS, axis=0).astype(np.intp).reshape(-1)
-    place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(own[:, COLUMNS // 2], axis=0), axis=1))])
-    share = np.abs(np.linspace(-1.0, 1.0, COLUMNS))
-    places = np.stack(np.meshgrid(place / place[-1], share, indexing="ij"), axis=-1).reshape(size, 2)
-    barbs = np.repeat(np.arange(ROWS), COLUMNS)
-    chance = rand(np.arange(count)[:, None] * ROWS + barbs, seed + 90)
+    count, vertices = len(rows), down * wide
+    side = np.repeat((np.arange(wide) >= wide // 2)[None], down, axis=0).astype(np.intp).reshape(-1)
+    place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(own[:, wide // 2], axis=0), axis=1))])
+    share = np.abs(np.linspace(-1.0, 1.0, wide))
+    places = np.stack(np.meshgrid(place / place[-1], share, indexing="ij"), axis=-1).reshape(vertices, 2)
+    barbs = np.repeat(np.arange(down), wide)
+    chance = rand(np.arange(count)[:, None] * down + barbs, seed + 90)
     made = vane_mesh(
-        values, seed, _flat(grid), _flat(unit(normals)), _flat(unit(outward)), _triangles(count),
+        values, seed, _flat(grid), _flat(unit(normals)), _flat(unit(outward)), _triangles(count, size),
         np.tile(side, count), _flat(np.tile(places, (count, 1, 1))),
         _flat(np.tile(own[None, ..., :2], (count, 1, 1, 1))),
         (1.0 + STREAKS * (chance - 0.5)).reshape(-1).astype(np.float32), np.tile(barbs, count).astype(np.int32),
@@ -75,9 +79,9 @@ def _spline(given: int, wanted: int) -> NDArray[np.float64]:
     return np.asarray(CubicSpline(ends, np.eye(given), bc_type="natural")(np.linspace(0.0, 1.0, wanted)))
 
 
-def _triangles(count: int) -> NDArray[np.int32]:
-    one = grid_triangles(ROWS, COLUMNS)
-    first = np.arange(count, dtype=np.int64)[:, None, None] * (ROWS * COLUMNS)
+def _triangles(count: int, size: tuple[int, int]) -> NDArray[np.int32]:
+    one = grid_triangles(*size)
+    first = np.arange(count, dtype=np.int64)[:, None, None] * (size[0] * size[1])
     return np.asarray((one + first).reshape(-1, 3), np.int32)
 
 

@@ -17,6 +17,7 @@ from core.curve import Curve
 from core.evaluator import Evaluator
 from core.feather.coat.base import (
     GIVE,
+    YIELD,
     Base,
     Stand,
     changed_rows,
@@ -25,6 +26,7 @@ from core.feather.coat.base import (
     limited,
     own_curves,
     seed_of,
+    strained,
 )
 from core.feather.coat.bed import Bed, bind_to_keys, field_directions, make_bed
 from core.feather.coat.coat import FEATHER_FIELDS, FEATHER_VALUES, FeatherCoat
@@ -56,7 +58,7 @@ class Laid(NamedTuple):
     """A coat at one frame, the rows those of the bed.
 
     ids : (N,) int32. shown : (N,) bool, what density keeps. layered : poses, vanes, boxes.
-    feathers : vanes at length 1, roots, frames. skin : the skin in the same pose.
+    feathers : vanes at length 1, roots, frames. skin : the skin in the same pose. give : see :class:`Base`.
     """
 
     ids: NDArray[np.int32]
@@ -66,6 +68,7 @@ class Laid(NamedTuple):
     bed: Bed
     skin: Skin
     fields: dict[str, Any]
+    give: NDArray[np.float64]
 
 
 class Plumage:
@@ -219,8 +222,9 @@ class Plumage:
         else:
             positions, frames, flow = carried(mesh, bed, rest_frames, flow_frames, skin)
             bends = curved(positions, flow, near, ranges)
-            # where the skin bends, feathers may rise with it; elsewhere so little that nothing is seen to jump
-            give = GIVE + fields["length"] * np.abs(bends - bend_of).max(axis=1)
+            # where the skin bends or stretches, feathers may rise; elsewhere so little that nothing is seen to jump
+            strain = strained(bed.positions, flow_frames, positions, flow, near)
+            give = GIVE + YIELD * strain + fields["length"] * np.abs(bends - bend_of).max(axis=1)
             stand = Stand(positions, frames, bends, fields["limit"], give)
         curves = self._remember("own curves", lambda: own_curves(own), own)
         return lie_down(coat, bed, stand, numbers, fields, own, curves, rank, sides)
@@ -347,7 +351,7 @@ class Plumage:
             values.evaluate(coat.density, frame, base.fields), len(bed.places.ids)
         )
         shown = rand(bed.places.ids, seed_of(coat) + 401) < density
-        return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields)
+        return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields, base.give)
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -6,7 +6,7 @@ from pxr import Gf, Usd, UsdGeom, UsdShade
 
 from core.evaluator import Evaluator
 from core.feather.coat.dress import dress_feathers
-from core.feather.coat.export import instances
+from core.feather.coat.export import added_at_rest, instances
 from core.feather.coat.plumage import Plumage
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.value import constant
@@ -77,8 +77,17 @@ def test_every_feather_its_own_mesh_keeps_every_point_and_id(tmp_path, laid):
 
 def test_frames_become_time_samples(tmp_path, laid):
     rest, evaluator, _ = laid
-    found = instances(rest, evaluator.workers, still=False)
+    found = instances(rest, evaluator.workers, added_at_rest(rest, evaluator.workers))
     stage = opened(tmp_path / "coat.usd", laid, animated=True, instances=found, ids=found.ids, vanes=None)
     coat = UsdGeom.PointInstancer(stage.GetPrimAtPath("/Feathers/plumage"))
     assert coat.GetPositionsAttr().GetTimeSamples() == [1001.0, 1002.0]
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (1001.0, 1002.0)
+
+
+def test_a_frame_in_which_nothing_moves_is_as_free_of_crossings_as_the_rest(laid):
+    rest, evaluator, _ = laid
+    alone = instances(rest, evaluator.workers)
+    frame = instances(rest, evaluator.workers, added_at_rest(rest, evaluator.workers))
+    assert crossing_by_solving(frame.vanes) == set()
+    assert len(frame.left.first) == len(frame.left.skin) == 0
+    np.testing.assert_allclose(frame.scales, alone.scales, rtol=1e-6)
