@@ -14,6 +14,7 @@ from core.formats.atomic import atomic_write
 from core.formats.shot_file import check_writable, write_shot
 from core.match.lens import coefficients, model_of
 from core.match.solve import report as judging
+from core.match.solve.held import Known, hold
 from core.match.solve.shot import shot_of
 from core.match.solve.solve import Options, Solution, observations_of, solve
 from core.match.track import Track
@@ -42,9 +43,9 @@ def check_outputs(outputs: Sequence[Path], page: Path | None) -> None:
 
 def solve_tracks(
     tracks: Sequence[Track], size: tuple[int, int], options: Options, outputs: Sequence[Path], page: Path | None,
-    telling: Report, title: str, picture: Any = None,
+    telling: Report, title: str, picture: Any = None, known: Sequence[Known] = (),
 ) -> Solved:
-    """Solve, judge and write; `picture` reads a frame of the plate for the page, or is None.
+    """Solve, judge and write; `picture` reads a frame of the plate for the page, or is None; `known` holds the solve.
 
     Raises
     ------
@@ -54,7 +55,7 @@ def solve_tracks(
     names = [track.name for track in tracks]
     with telling.stage("solve", "solving"):
         observations, frames = observations_of(tracks)
-        solution = solve(observations, frames, len(names), size, options, telling.words)
+        solution = hold(solve(observations, frames, len(names), size, options, telling.words), names, known)
         told = judging.report(solution, names)
     shot = shot_of(solution, names)
     with telling.stage("write", "writing"):

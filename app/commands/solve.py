@@ -10,6 +10,7 @@ import typer
 from app.report import Report
 from app.solving import check_outputs, solve_tracks
 from core.errors import UserError
+from core.formats.known_file import read_known
 from core.formats.track_file import read_tracks
 from core.match.lens import MODELS
 from core.match.solve.solve import Options
@@ -25,6 +26,7 @@ def command(
     zoom: Annotated[bool, typer.Option("--zoom", help="The focal length changes over the shot.")] = False,
     lens: Annotated[str, typer.Option(help="Find the bend of the lens too: brown, fisheye, or of 3DEqualizer radial4 and anamorphic4.")] = "none",
     nodal: Annotated[bool, typer.Option("--nodal", help="The camera only turns, as on a tripod.")] = False,
+    known: Annotated[Path | None, typer.Option(help="Hold the solve to survey points, .csv of name, x, y, z, sigma; or to constraints, .json.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page that says how good the solve is and what to mend: .html.")] = None,
     size: Annotated[str | None, typer.Option(help="Size of the plate where the file does not say, as 1920x1080.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -41,7 +43,8 @@ def command(
             plate = plate or given.size
             if plate is None:
                 raise UserError(f"{tracks.name} does not say how large the plate is; give --size 1920x1080.")
-        done = solve_tracks(given.tracks, plate, asked, outputs, report, telling, tracks.stem)
+            held = read_known(known) if known is not None else ()
+        done = solve_tracks(given.tracks, plate, asked, outputs, report, telling, tracks.stem, known=held)
     for words in done.told.warnings:
         telling.note(words)
     telling.done(done.result, done.lines)
