@@ -11,11 +11,13 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
+from app.window.palette import Palette
 from app.window.pose import map_panel as pose_map_panel
 from app.window.pose.controls import PoseControls
 from app.window.pose.overlay import skeleton_of
 from app.window.pose.poses import PoseLibrary, PoseList
 from app.window.pose.rig_panel import RigPanel
+from core.camera import clip_from_world
 from core.demo.pose_document import pose_document
 from core.document import Document, find_mesh, with_mesh
 from core.overlay import Circle
@@ -24,10 +26,13 @@ from core.pose.edit_layers import cross_talk
 from core.pose.pose import REST, Pose
 from core.pose.rig import playing
 from core.pose.rotation import euler_from_quaternion, quaternion_from_euler
+from core.pose.sculpt.symmetry import opposites_by_axis
 from core.pose.synthesis import evaluate
+from core.pose.weights import weights_of
 from core.posed import shown_points
 from core.record import freeze
 from docs.first_pose import elbow_on_screen
+from tests.tools import pose_scenes
 from tests.window.conftest import Opened
 from tests.window.hand import Hand
 from tools import control_edits
@@ -570,3 +575,39 @@ def test_weights_are_painted_by_the_hand_and_kept_in_order_by_actions(posing: Ha
     posing.drag((x, y), (x + 0.03, y), steps=4)
     assert "locked" in said[0]
     assert (share() == locked).all()
+
+
+def test_weights_are_mirrored_while_the_hand_paints_and_by_words_afterwards(opened: Opened) -> None:
+    """With symmetry the other side's joint is painted as well; what was painted on one side alone is mirrored later."""
+    hand = opened(pose_scenes.document(joint_selection=("arm_L",)))
+    window, desk = hand.window, hand.window.desk
+    desk.set_craft("pose")
+    desk.choose("weights")
+    hand.rest()
+    pairs = opposites_by_axis(pose_scenes.strip().points)
+
+    def share(joint: str) -> np.ndarray:
+        return weights_of(desk.posed.rig.skin, pose_scenes.JOINTS.index(joint))
+
+    def place(x: float) -> tuple[float, float]:
+        view, (width, height) = window.viewport, window.viewport.pixels()
+        clip = clip_from_world(view.eye.camera, width, height) @ np.array([x, 0.0, 0.05, 1.0])
+        return (clip[0] / clip[3] + 1) / 2, (1 - clip[1] / clip[3]) / 2
+
+    before = share("arm_L").copy()
+    hand.drag(place(0.25), place(0.35), steps=3)
+    assert (share("arm_L") - before).max() > 0.05
+    assert np.abs(share("arm_R") - share("arm_L")[pairs]).max() > 0.05
+    hand.key(Qt.Key.Key_K, Qt.KeyboardModifier.ControlModifier)
+    (palette,) = window.findChildren(Palette)
+    QTest.keyClicks(palette.line, "mirror weights")
+    QTest.keyClick(palette.line, Qt.Key.Key_Return)
+    hand.rest()
+    assert desk.session.history.undo_name == "Mirror weights"
+    assert np.abs(share("arm_R") - share("arm_L")[pairs]).max() < 1e-5
+    window.commands.run("tool.symmetry")
+    painted = share("arm_L").copy()
+    hand.drag(place(0.4), place(0.5), steps=3)
+    assert (share("arm_L") - painted).max() > 0.02
+    # in the middle, where both rings reach, one side is painted after the other
+    assert np.abs(share("arm_R") - share("arm_L")[pairs]).max() < 1e-3
