@@ -105,13 +105,13 @@ def _write_mesh(
     AbcGeom.OPolyMesh(AbcGeom.OXform(parent, name), f"{name}Shape").getSchema().set(sample)
 
 
-def read_properties(properties: Any, said: dict[str, Any]) -> None:
+def read_properties(properties: Any, said: dict[str, Any], names: tuple[str, ...] = (UNIT, UP)) -> None:
     from alembic3d import Abc
 
     if properties.valid():
         for row in range(properties.getNumProperties()):
             header = properties.getPropertyHeader(row)
-            if header.isScalar() and header.getName() in (UNIT, UP):
+            if header.isScalar() and header.getName() in names:
                 said.setdefault(header.getName(), Abc.IScalarProperty(properties, header.getName()).getValue())
 
 

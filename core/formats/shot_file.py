@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from core.errors import UserError
-from core.formats import shot_models, shot_text, usd_solve
+from core.formats import alembic_solve, shot_models, shot_text, usd_solve
 from core.formats.atomic import atomic_write
 from core.formats.lens_file import lens_text
 from core.match.solve.shot import Shot
@@ -17,8 +17,8 @@ TEXTS: dict[str, Callable[[Shot], str]] = {
     ".nk": shot_text.nuke_text, ".chan": shot_text.chan_text, ".ma": shot_text.maya_text,
     ".py": shot_text.blender_text, ".txt": lambda shot: lens_text(shot.lens, shot.size),
 }  # fmt: skip
-WRITTEN = (*usd_solve.SUFFIXES, *TEXTS, *COLMAP)
-READ = (*usd_solve.SUFFIXES, ".nk", ".chan", ".out", ".json", *COLMAP)
+WRITTEN = (*usd_solve.SUFFIXES, alembic_solve.SUFFIX, *TEXTS, *COLMAP)
+READ = (*usd_solve.SUFFIXES, alembic_solve.SUFFIX, ".nk", ".chan", ".out", ".json", *COLMAP)
 
 
 def check_writable(path: Path) -> None:
@@ -36,6 +36,9 @@ def write_shot(path: Path, shot: Shot, said: dict[str, Any]) -> None:
         text = TEXTS[suffix](shot)
         with atomic_write(path) as beside:
             beside.write_text(text, encoding="utf-8")
+    elif suffix == alembic_solve.SUFFIX:
+        with atomic_write(path) as beside:
+            alembic_solve.write(beside, shot)
     else:
         with atomic_write(path) as beside:
             usd_solve.write(beside, shot, said)
@@ -54,6 +57,8 @@ def read_shot(path: Path, size: tuple[int, int] | None) -> Shot:
     suffix = path.suffix.lower()
     if suffix in usd_solve.SUFFIXES:
         return usd_solve.read_shot(path)
+    if suffix == alembic_solve.SUFFIX:
+        return alembic_solve.read_shot(path)
     if path.name.lower() in COLMAP:
         return shot_models.read_colmap(path)
     if path.stat().st_size > shot_models.LARGEST:

@@ -1,6 +1,6 @@
 """A solved camera as OpenUSD: one camera with a sample per frame, and the points of the scene.
 
-Y is up; the picture is `FILM` millimetres wide, the focal length stands in the same unit (tenths of the stage's unit,
+Y is up; the picture is 36 millimetres wide, the focal length stands in the same unit (tenths of the stage's unit,
 as USD has them, whatever that is: a solve has no size until somebody measures something). USD knows no bend of a lens:
 its numbers stand in the custom data of ``/Solve``, and the picture of the camera is the straight one.
 """
@@ -14,16 +14,14 @@ import numpy as np
 
 from core.errors import UserError
 from core.formats.sandbox import run_bounded
+from core.formats.shot_film import film_of, shot_of_film
 from core.formats.usd_camera_path import KEY
-from core.match.lens import MODELS, model_of, start_lens
-from core.match.solve.shot import Shot, shot_from_up
-from core.match.solve.state import CENTRE_X, CENTRE_Y
+from core.match.lens import model_of
+from core.match.solve.shot import Shot
 
 SUFFIXES = (".usda", ".usdc", ".usd")
-FILM = 36.0
 POINT = 0.01  # width of a point over its distance
 SECONDS, MEMORY = 60.0, 4 << 30
-WIDTH = 1920  # of the plate, where a file does not say
 
 
 def write(path: Path, shot: Shot, said: dict[str, Any], fps: float = 24.0) -> None:
@@ -50,20 +48,20 @@ def write(path: Path, shot: Shot, said: dict[str, Any], fps: float = 24.0) -> No
     stage.SetDefaultPrim(root.GetPrim())
     camera = UsdGeom.Camera.Define(stage, "/Solve/camera")
     width, height = shot.size
-    camera.CreateHorizontalApertureAttr(FILM)
-    camera.CreateVerticalApertureAttr(FILM * height / width / shot.stretch)
-    lens = shot.lens
-    camera.CreateHorizontalApertureOffsetAttr(-(lens[CENTRE_X] - 0.5 * (width - 1)) * FILM / width)
-    camera.CreateVerticalApertureOffsetAttr((lens[CENTRE_Y] - 0.5 * (height - 1)) * FILM / width / shot.stretch)
+    film = film_of(shot)
+    camera.CreateHorizontalApertureAttr(film[0, 1])
+    camera.CreateVerticalApertureAttr(film[0, 2])
+    camera.CreateHorizontalApertureOffsetAttr(film[0, 3])
+    camera.CreateVerticalApertureOffsetAttr(film[0, 4])
     pose = camera.MakeMatrixXform()
     focal = camera.CreateFocalLengthAttr()
     if not shot.zooms:
-        focal.Set(float(shot.focal[0]) * FILM / width)
+        focal.Set(film[0, 0])
     matrices, places = shot.up()
     for row, frame in enumerate(shot.frames):
         pose.Set(Gf.Matrix4d(matrices[row].T), float(frame))  # USD's vectors are rows
         if shot.zooms:
-            focal.Set(float(shot.focal[row]) * FILM / width, float(frame))
+            focal.Set(film[row, 0], float(frame))
     middle = matrices[:, :3, 3].mean(axis=0)
     distance = float(np.median(np.linalg.norm(places - middle, axis=1))) if len(places) else 1.0
     camera.CreateClippingRangeAttr(Gf.Vec2f(max(1e-6, 0.01 * distance), 100.0 * distance))
@@ -75,8 +73,8 @@ def write(path: Path, shot: Shot, said: dict[str, Any], fps: float = 24.0) -> No
     names = points.GetPrim().CreateAttribute("primvars:trackNames", Sdf.ValueTypeNames.StringArray)
     names.Set(list(shot.names))
     root.GetPrim().SetCustomDataByKey(KEY, {
-        "width": width, "height": height, "lens": model_of(lens).name,
-        "lens_numbers": Vt.DoubleArray.FromNumpy(np.ascontiguousarray(lens)), **said,
+        "width": width, "height": height, "lens": model_of(shot.lens).name,
+        "lens_numbers": Vt.DoubleArray.FromNumpy(np.ascontiguousarray(shot.lens)), **said,
     })
     if not layer.Export(str(path)):
         raise UserError(f"{path.name} could not be written; look whether the folder is there and has room.")
@@ -95,28 +93,11 @@ def read_shot(path: Path) -> Shot:
     found = run_bounded(
         "core.formats.usd_camera_path:read_in_child", {"path": str(path)}, what=path.name, seconds=SECONDS,
         memory=MEMORY)
-    matrix, film, frames = found["world"], found["film"], found["frames"]
-    if not len(matrix) or not (np.isfinite(matrix).all() and np.isfinite(film).all()):
+    world, film, frames = found["world"], found["film"], found["frames"]
+    if not len(world) or not (np.isfinite(world).all() and np.isfinite(film).all()):
         raise UserError(f"{path.name} holds no camera that can be used.")
-    if found["up"] == "z":
-        matrix = Z_UP @ matrix
     width, height = (int(v) for v in found["size"])
-    if not width:
-        width, height = WIDTH, max(1, round(WIDTH * float(film[0, 2] / film[0, 1])))
-    pixel = film[:, 1] / width
-    focal = film[:, 0] / pixel
     points = np.asarray(found["points"], np.float64).reshape(-1, 3)
-    if found["up"] == "z":
-        points = points @ Z_UP[:3, :3].T
-    lens = np.asarray(found["lens"], np.float64)
-    if len(lens) not in {model.columns for model in MODELS} or not np.isfinite(lens).all():
-        lens = start_lens(float(focal[0]), width, height)
-        stretch = height * pixel[0] / film[0, 2]
-        lens[3] = np.log(stretch)
-        lens[CENTRE_X] -= film[0, 3] / pixel[0]
-        lens[CENTRE_Y] += film[0, 4] / pixel[0] * stretch
-    lens[0] = np.log(focal[0])
-    return shot_from_up((width, height), frames.astype(np.int32), matrix, focal, points, tuple(found["names"]), lens)
-
-
-Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    return shot_of_film(
+        (width, height), frames, world, film, points, tuple(found["names"]), found["up"],
+        np.asarray(found["lens"], np.float64))

@@ -23,7 +23,7 @@ from tools.match_edits import add_plate, add_tracks, shown_plate
 from tools.plate_edits import relink_plate
 from tools.solve_edits import solved_of
 
-CAMERAS = (".usda", ".usdc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
+CAMERAS = (".usda", ".usdc", ".abc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
 
 

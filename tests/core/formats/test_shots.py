@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+from alembic3d import Abc, AbcGeom
 from pxr import Usd
 from scipy.spatial.transform import Rotation
 
@@ -48,6 +49,28 @@ def test_what_is_written_is_read_again(name, model, zoom, tmp_path):
     back = read_shot(tmp_path / name, None)
     _same_pictures(made, back)
     np.testing.assert_allclose(back.points, made.points, atol=1e-5)
+
+
+@pytest.mark.parametrize("gap", [False, True])
+def test_alembic_has_the_straight_camera_its_offsets_and_the_names_of_tracks(gap, tmp_path):
+    made = _shot(zoom=True, bent=False)
+    made.lens[4:6] += 31.0, -17.0
+    made.lens[3] = 0.2
+    if gap:
+        made = made._replace(frames=made.frames + (np.arange(12) > 6).astype(np.int32))
+    write_shot(tmp_path / "a.abc", made, {})
+    back = read_shot(tmp_path / "a.abc", None)
+    _same_pictures(made, back)
+    assert (back.size, back.names) == (made.size, made.names)
+    np.testing.assert_allclose(back.points, made.points, atol=1e-5)
+    archive = Abc.IArchive(str(tmp_path / "a.abc"))
+    node = AbcGeom.IXform(AbcGeom.IXform(archive.getTop(), "Solve"), "camera")
+    sample = AbcGeom.ICamera(node, "cameraShape").getSchema().getValue(Abc.ISampleSelector(float(1004 / 24.0)))
+    across = 2.0 * np.degrees(np.arctan2(0.5 * SIZE[0], made.focal[3]))
+    assert sample.getFieldOfView() == pytest.approx(across, rel=1e-6)
+    (tmp_path / "broken.abc").write_bytes(b"Ogawa" + bytes(60))
+    with pytest.raises(UserError, match=r"broken\.abc"):
+        read_shot(tmp_path / "broken.abc", None)
 
 
 @pytest.mark.parametrize("name", ["a.nk", "a.chan"])
