@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QListWidget, QListWidgetItem, QPushButton, QVBoxLayout, QWidget
 
 from app.window.desk import Desk
+from app.window.match.error_curve import ErrorCurve
 from app.window.match.solve_job import SolveJob
 from app.window.params_panel import RecordForm, Setting
 from core.match.solved import Advice, SolvedCamera
@@ -34,6 +35,8 @@ class SolvePanel(QWidget):
         for label in (self.figures, self.warnings):
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.curve = ErrorCurve()
+        self.curve.chosen.connect(self._go_to)
         self.advice = QListWidget()
         self.advice.setToolTip("What to mend next, the most helpful first. A click goes to the frame or the track.")
         self.advice.setWordWrap(True)
@@ -51,10 +54,11 @@ class SolvePanel(QWidget):
         line.addWidget(self.without)
         column.addWidget(self.form)
         column.addLayout(line)
-        for widget in (self.figures, self.warnings, self.advice):
+        for widget in (self.figures, self.curve, self.warnings, self.advice):
             column.addWidget(widget)
         self._seen: tuple[object, ...] = ()
         desk.changed.connect(lambda old, new: self.refresh())
+        desk.workspace_changed.connect(lambda old, new: self._mark_frame())
         desk.session_replaced.connect(self.refresh)
         desk.stroke_ended.connect(self.refresh)
         job.changed.connect(self.refresh)
@@ -69,6 +73,7 @@ class SolvePanel(QWidget):
     def refresh(self) -> None:
         """Show what is on the desk now."""
         plate, solved = shown_plate(self.desk.document), self.solved
+        self._mark_frame()
         seen = (None if plate is None else plate.id, solved, self.job.settings, self.job.running)
         if seen == self._seen or self.desk.session.stroking:
             return
@@ -78,6 +83,7 @@ class SolvePanel(QWidget):
         self.start.setEnabled(not self.job.running)
         self.start.setText("Solving ..." if self.job.running else "Solve camera" if solved is None else "Solve again")
         self.figures.setVisible(solved is not None)
+        self.curve.setVisible(solved is not None)
         self.warnings.setVisible(solved is not None and bool(solved.warnings))
         self.advice.clear()
         self.advice.setVisible(solved is not None and bool(solved.advice))
@@ -105,6 +111,16 @@ class SolvePanel(QWidget):
             if track is not None and len(track.frames):
                 frame = int(track.frames[len(track.frames) // 2])
         if frame is not None:
+            self._go_to(frame)
+
+    def _mark_frame(self) -> None:
+        plate = shown_plate(self.desk.document)
+        if plate is not None:
+            self.curve.show_solve(self.solved, round(self.desk.workspace.frame) - plate.offset)
+
+    def _go_to(self, frame: int) -> None:
+        plate = shown_plate(self.desk.document)
+        if plate is not None:
             self.desk.set_workspace(frame=float(frame + plate.offset))
 
     def _leave_out(self) -> None:
@@ -122,12 +138,22 @@ class SolvePanel(QWidget):
 
 
 def figures_of(solved: SolvedCamera) -> str:
-    """The figures of a solve in three lines."""
+    """What a solve says of itself: a sentence, and three lines of figures."""
     low, high = float(np.min(solved.focal)), float(np.max(solved.focal))
     focal = f"{low:.1f} px" if high - low < 0.05 else f"{low:.1f} to {high:.1f} px"
     doubt = f" +- {solved.focal_sigma:.1f}" if solved.focal_sigma else ""
     return (
+        f"{verdict_of(solved)}\n"
         f"{len(solved.frames)} cameras ({solved.kind}), {len(solved.points)} points\n"
         f"median {solved.median:.2f}   RMS {solved.rms:.2f}   95 % {solved.p95:.2f} px\n"
         f"focal length {focal}{doubt}"
     )
+
+
+def verdict_of(solved: SolvedCamera) -> str:
+    """Why a camera is to be trusted, or that something is to be looked at first."""
+    if solved.warnings:
+        return "Look at the warnings below before you trust this camera."
+    left = sum("left out" in one.words for one in solved.advice)
+    out = f"; {left} that did not fit {'is' if left == 1 else 'are'} left out" if left else ""
+    return f"The camera holds: {len(solved.points)} points move as one with it{out}."

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
 
 from app.window.match.solve_panel import SolvePanel
 from core.document import Document
@@ -50,6 +52,13 @@ def test_a_camera_is_solved_judged_and_given_away(opened: Opened, tmp_path: Path
     panel = window.findChild(SolvePanel)
     assert panel is not None
     assert "16 cameras (free)" in panel.figures.text()
+    assert panel.figures.text().startswith(("The camera holds", "Look at the warnings"))
+    panel.curve.resize(200, 60)
+    press = QPointF(198.0, 30.0)
+    panel.curve.mousePressEvent(QMouseEvent(
+        QEvent.Type.MouseButtonPress, press, press, Qt.MouseButton.LeftButton, Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier))
+    assert desk.workspace.frame == 1016
     words = [panel.advice.item(k).text() for k in range(panel.advice.count())]
     at = next(k for k, text in enumerate(words) if text.startswith("point 8 does not fit"))
     panel.advice.itemClicked.emit(panel.advice.item(at))
