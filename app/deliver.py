@@ -35,7 +35,6 @@ VIEWS = {
 }
 
 
-UNDER = 0.5  # of the colour of feathers: that of the skin they leave bare
 SAVED = "saved"  # the view as a project was left
 SIZE = (1600, 1000)
 
@@ -109,16 +108,16 @@ def draw(
     camera: Camera | None = None, feathers: tuple[FeatherMesh, ...] = (),
 ) -> None:
     """Draw the document's meshes and coats into a PNG, at rest or in the pose of `skins`, from a side or a camera."""
-    from viewport.document_scene import scene_of  # GL is loaded only when a picture is asked for
+    from viewport.document_scene import scene_of, under_feathers  # GL is loaded only when a picture is asked for
 
     shown = posed_document(document, None, evaluator) if skins is None else skins
     first = next(iter(shown.values()), None)
     direction = VIEWS[view] if first is None else turned_view(VIEWS[view], first)
     scene = scene_of(document, shown, children)
-    if feathers:  # skin between them is as dark as what lies under feathers
-        red, green, blue = (UNDER * float(np.mean([mesh.colors[:, k].mean() for mesh in feathers])) for k in range(3))
+    if feathers:
+        skin = under_feathers(feathers)
         scene = scene._replace(
-            feathers=feathers, surfaces=tuple(s._replace(color=(red, green, blue)) for s in scene.surfaces))
+            feathers=feathers, surfaces=tuple(s._replace(color=skin) for s in scene.surfaces))
     _picture(path, scene, size, direction, camera)
 
 

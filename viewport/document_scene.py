@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from core.document import Document, visible_grooms
+from core.feather.pieces import FeatherMesh
 from core.groom.children import Children, Traits
 from core.groom.groom import Coat as CoatRecord
 from core.groom.strands import GroomStrands, Strands
@@ -15,6 +16,7 @@ from viewport.scene import Coat, Color, GuideLines, Look, Scene, Surface, mean_w
 
 SKIN = (0.36, 0.35, 0.34)
 DRAWN_POINTS = 16
+UNDER = 0.5  # of the colour of feathers: that of the skin they leave bare
 
 
 def scene_of(document: Document, skins: Mapping[int, Skin], children: Mapping[int, Children]) -> Scene:
@@ -103,3 +105,10 @@ def resampled(strands: Strands) -> np.ndarray:
     share = (at - low)[..., None]
     first = strands.points[starts[:, None] + low]
     return np.ascontiguousarray(first * (1 - share) + strands.points[starts[:, None] + low + 1] * share, np.float32)
+
+
+def under_feathers(meshes: Iterable[FeatherMesh]) -> Color:
+    """What skin between feathers is painted in: as dark as what lies under them."""
+    means = [mesh.colors.mean(axis=0) for mesh in meshes if len(mesh.colors)]
+    red, green, blue = (UNDER * float(v) for v in np.mean(means, axis=0)) if means else (0.1, 0.1, 0.1)
+    return red, green, blue

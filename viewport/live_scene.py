@@ -45,7 +45,8 @@ from core.groom.maps import at_vertices
 from core.mesh.edges import edge_vertices
 from core.mesh.skin import Posed, skin_at_rest
 from core.workspace import ViewOptions
-from viewport.document_scene import SKIN, look_of, skin_of, widths_of
+from viewport.document_scene import SKIN, look_of, skin_of, under_feathers, widths_of
+from viewport.live_feathers import Asked, FeatherPicture, LiveFeathers
 from viewport.live_guides import LiveGuides
 from viewport.posed_frames import PosedFrames
 from viewport.scene import Coat, GuideLines, Look, Scene, Surface
@@ -77,20 +78,20 @@ class Done(NamedTuple):
     """The result of a job, for :meth:`LiveScene.adopt`."""
 
     job: Job
-    value: LiveCoat | CoatBinding | Collision
+    value: LiveCoat | CoatBinding | Collision | FeatherPicture
 
 
 class Job(NamedTuple):
     """Something slow. `run` is called on any thread and touches nothing that is shown.
 
-    name : for people. kind, id : grow or bind, of a groom; settle, of a mesh. about : what it was asked for.
+    name : for people. kind, id : grow or bind, of a groom; lay, of feathers; settle, of a mesh. about : what for.
     """
 
     name: str
     kind: str
     id: int
     about: object
-    work: Callable[[], LiveCoat | CoatBinding | Collision]
+    work: Callable[[], LiveCoat | CoatBinding | Collision | FeatherPicture]
 
     def run(self) -> Done:
         """Do it. UserError when it cannot be done: hand the job to :meth:`LiveScene.abandon` then."""
@@ -118,6 +119,7 @@ class LiveScene:
     def __init__(self, evaluator: Evaluator, frame_bytes: int = 256 << 20) -> None:
         self._evaluator = evaluator
         self._frames = PosedFrames(evaluator, frame_bytes)
+        self._feathers = LiveFeathers(evaluator)
         self._grooms: dict[int, _Shown] = {}
         self._skins: dict[tuple[int, bool], Collision] = {}  # by mesh and whether it is at rest, one pose each
         self._asked: dict[tuple[str, int], Job] = {}
@@ -147,6 +149,7 @@ class LiveScene:
         self._document, self._frame, self._stroking, self._hairs = document, frame, stroking, hairs
         self._options = ViewOptions() if options is None else options
         self._groom = groom
+        self._feathers.follow(document)
         alive = {item.id for item in document.grooms}
         self._grooms = {k: shown for k, shown in self._grooms.items() if k in alive}
         meshes = {item.id for item in document.meshes}
@@ -199,6 +202,10 @@ class LiveScene:
             if item is not None:
                 self._skins[job.id, value.points is item.mesh.points] = value
             return
+        if isinstance(value, FeatherPicture):
+            assert isinstance(job.about, Asked)
+            self._feathers.adopt(job.about, value)
+            return
         shown = self._grooms.get(job.id)
         if shown is None:
             return
@@ -250,6 +257,9 @@ class LiveScene:
                 return collision(item.mesh, points, evaluator)
 
             jobs.append(Job(f"Preparing the skin of {item.name}", "settle", item.id, wanted, settle))
+        if not self._stroking and self._document.feathers:
+            asked = self._feathers.wanted(self._document, self._posed, self._visible_meshes(), frame)
+            jobs += [Job(f"Laying the feathers of {a.coat.name}", "lay", a.coat.id, a, lay) for a, lay in asked]
         return jobs
 
     # -- how ---------------------------------------------------------------------------------------------
@@ -257,6 +267,9 @@ class LiveScene:
     def _visible_meshes(self) -> list[MeshObject]:
         only = self._options.isolated
         return [m for m in self._document.meshes if not m.hidden and (not only or m.id in only)]
+
+    def _posed(self, item: MeshObject) -> Posed:
+        return self._frames.posed(item, self._frame)
 
     def _visible(self) -> list[tuple[MeshObject, Groom, Posed]]:
         meshes = {item.id: item for item in self._visible_meshes()}
@@ -322,17 +335,25 @@ class LiveScene:
         lines: list[GuideLines] = []
         if options.guides:
             lines = [self._grooms[groom.id].guides.lines() for _, groom, _ in visible if len(groom.guides)]
+        feathers = self._feathers.shown(self._document, self._posed, self._visible_meshes())
         surfaces = []
         for item in self._visible_meshes():
             posed = self._frames.posed(item, self._frame)
+            skin = skin_of(looks[item.id]) if item.id in looks else SKIN
+            if item.id in feathers:
+                skin = under_feathers(mesh for picture in feathers[item.id] for mesh in picture.quick)
             wire = options.wire or options.shading == "wire"
             surfaces.append(Surface(
                 posed.points, posed.normals, skin_at_rest(item.mesh, self._evaluator).triangles.vertices,
-                skin_of(looks[item.id]) if item.id in looks else SKIN, self._map_values(item), "map",
+                skin, self._map_values(item), "map",
                 item.id in options.ghosted, self._evaluator.get(edge_vertices, item.mesh) if wire else None,
                 item.id in looks,
             ))
-        return Scene(tuple(surfaces), tuple(coats), tuple(lines))
+        pictures = [picture for found in feathers.values() for picture in found]
+        return Scene(
+            tuple(surfaces), tuple(coats), tuple(lines), feathers=tuple(m for p in pictures for m in p.fine),
+            quick_feathers=tuple(m for p in pictures for m in p.quick),
+        )
 
     def _look(self, groom: Groom, live: LiveCoat) -> tuple[Look, NDArray[np.float32] | None]:
         shown, traits = self._grooms[groom.id], live.children.traits
@@ -371,5 +392,7 @@ def _same_about(a: object, b: object) -> bool:
     """True when a job that failed would fail again."""
     if isinstance(a, _About) and isinstance(b, _About):
         return a.item.mesh is b.item.mesh and a.groom.coat is b.groom.coat and a.groom.maps is b.groom.maps
+    if isinstance(a, Asked) and isinstance(b, Asked):
+        return a.same(b)
     return a is b
 

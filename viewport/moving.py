@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import moderngl
@@ -213,7 +214,7 @@ class Moving:
             self.guides, [drawn for _, drawn in self._near],
             lambda lines: GuideDrawable(ctx, renderer.guide_programs, lines, room=rooms[id(lines)]),
         )
-        renderer.solids.upload(scene)
+        renderer.solids.upload(scene, quick=True)
         self._across = {
             id(drawn): float(np.clip(drawn.look.root_width / max(coat.look.root_width, 1e-12), 1.0, MOST_ACROSS))
             for coat, drawn in self._sparse
@@ -221,13 +222,13 @@ class Moving:
 
     def _light(self, scene: Scene, toward: np.ndarray) -> dict[str, Any]:
         """The maps of a light that has turned but little are those it had: redrawing them costs more than it shows."""
-        key = (*scene.surfaces, *scene.coats, self._hairs)
+        key = (*scene.surfaces, *scene.quick_feathers, *scene.coats, self._hairs)
         if not same(self._light_key, key) or not alike(self._toward, toward):
             shares = []
             for coat, drawn in self._sparse:
                 narrower = mean_width(coat.look) / max(mean_width(drawn.look), 1e-12)
                 shares.append(stands_for(coat, self._hairs) * narrower)
-            cast, outline = self.renderer.solids.cast_shadows, self.renderer.outline.of(scene)
+            cast, outline = partial(self.renderer.solids.cast_shadows, quick=True), self.renderer.outline.of(scene)
             self._lighting = _finish(self.light_maps.draw(scene, toward, cast, self.coats, outline, shares))
             self._light_key, self._toward = key, toward
         return self._lighting
@@ -238,8 +239,8 @@ class Moving:
     ) -> None:
         lit = (self._light_key, tuple(self._toward.tolist())) if maps is self.light_maps else id(maps)
         key = (
-            *scene.surfaces, *(coat.look for coat in scene.coats), scene.background, scene.exposure, scene.lights,
-            camera, size, options, self.renderer.backdrop.image, lit,
+            *scene.surfaces, *scene.quick_feathers, *(coat.look for coat in scene.coats), scene.background,
+            scene.exposure, scene.lights, camera, size, options, self.renderer.backdrop.image, lit,
         )
         if self.base is not None and same(self._base_key, key):
             return

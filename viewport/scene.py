@@ -124,7 +124,10 @@ class Lights(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Everything in one picture. `background` is display RGB 0 .. 1 at the top and at the bottom."""
+    """Everything in one picture. `background` is display RGB 0 .. 1 at the top and at the bottom.
+
+    feathers : of finished pictures. quick_feathers : the same with fewer triangles, of moving ones.
+    """
 
     surfaces: tuple[Surface, ...] = ()
     coats: tuple[Coat, ...] = ()
@@ -133,6 +136,7 @@ class Scene(NamedTuple):
     background: tuple[Color, Color] = ((0.2275, 0.2314, 0.2471), (0.1216, 0.1255, 0.1373))
     exposure: float = 1.0
     feathers: tuple[FeatherMesh, ...] = ()
+    quick_feathers: tuple[FeatherMesh, ...] = ()
 
 
 def thinned(coat: Coat, most: int) -> Coat:

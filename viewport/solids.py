@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.camera import Camera
+from core.feather.pieces import FeatherMesh
 from core.workspace import ViewOptions
 from viewport.drawables.feathers import FeatherDrawable, FeatherPrograms
 from viewport.drawables.grid import GridDrawable
@@ -43,21 +44,29 @@ class Solids:
         self.meshes: list[MeshDrawable] = []
         self.feather_programs: FeatherPrograms | None = None  # made with the first feather
         self.feathers: list[FeatherDrawable] = []
+        self.quick_feathers: list[FeatherDrawable] = []
 
-    def upload(self, scene: Scene) -> None:
-        """Bring the surfaces onto the card."""
+    def upload(self, scene: Scene, quick: bool = False) -> None:
+        """Bring the surfaces onto the card; feathers those of finished pictures, or `quick` of moving ones."""
         self.meshes = matched(self.meshes, scene.surfaces, lambda s: MeshDrawable(self.ctx, self.programs, s))
-        if scene.feathers and self.feather_programs is None:
+        if (scene.feathers or scene.quick_feathers) and self.feather_programs is None:
             self.feather_programs = FeatherPrograms(self.ctx)
         programs = self.feather_programs
-        self.feathers = matched(self.feathers, scene.feathers, lambda f: FeatherDrawable(self.ctx, programs, f))
 
-    def cast_shadows(self, clip_from_world: NDArray[np.float64]) -> None:
+        def made(mesh: FeatherMesh) -> FeatherDrawable:
+            return FeatherDrawable(self.ctx, programs, mesh)
+
+        if quick:
+            self.quick_feathers = matched(self.quick_feathers, scene.quick_feathers, made)
+        else:
+            self.feathers = matched(self.feathers, scene.feathers, made)
+
+    def cast_shadows(self, clip_from_world: NDArray[np.float64], quick: bool = False) -> None:
         """Draw the depth of all that keeps light off the rest."""
         for mesh in self.meshes:
             if not mesh.surface.ghost:
                 mesh.draw_depth(clip_from_world)
-        for feathers in self.feathers:
+        for feathers in self.quick_feathers if quick else self.feathers:
             feathers.draw_depth(clip_from_world)
 
     def draw(
@@ -78,7 +87,7 @@ class Solids:
         solid = [mesh for mesh in self.meshes if not mesh.surface.ghost]
         if options.shading != "wire":
             self._fill(solid, scene, uniforms, options.shading, quick)
-        for feathers in self.feathers:
+        for feathers in self.quick_feathers if quick else self.feathers:
             feathers.draw(uniforms)
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
@@ -116,8 +125,8 @@ class Solids:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        things: list[Any] = [*self.meshes, *self.feathers, self.grid, self.programs]
+        things: list[Any] = [*self.meshes, *self.feathers, *self.quick_feathers, self.grid, self.programs]
         things += [] if self.feather_programs is None else [self.feather_programs]
         for thing in things:
             thing.release()
-        self.meshes, self.feathers, self.feather_programs = [], [], None
+        self.meshes, self.feathers, self.quick_feathers, self.feather_programs = [], [], [], None

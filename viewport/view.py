@@ -280,7 +280,8 @@ class View3D:
     def _light_key(self) -> tuple[tuple[Any, ...], NDArray[np.float64]]:
         assert self.camera is not None
         toward = light_directions(self.scene, self.camera)
-        return (*self.scene.surfaces, bool(self.scene.coats), self.scene.lights), toward["key"]
+        scene = self.scene
+        return (*scene.surfaces, *scene.feathers, bool(scene.coats), scene.lights), toward["key"]
 
     def _lit_alike(self) -> bool:
         """True when the finished maps of the light do for a moving picture of now."""

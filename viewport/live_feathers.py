@@ -1,0 +1,110 @@
+"""Coats of feathers as the window shows them: laid by jobs on other threads, kept until they are laid again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.document import Document, MeshObject, find_mesh, keys_of
+from core.evaluator import Evaluator
+from core.feather.coat.coat import FeatherCoat
+from core.feather.pieces import FeatherMesh
+from core.groom.groom import Groom
+from core.mesh.skin import Posed, skin_at_rest, skin_posed
+
+FINE, QUICK = (11, 5), (4, 3)  # rows and columns of a vane, at rest and while things move
+
+
+class FeatherPicture(NamedTuple):
+    """A coat as triangles in space, one mesh for each kind of feather: as seen at rest, and while things move."""
+
+    fine: tuple[FeatherMesh, ...]
+    quick: tuple[FeatherMesh, ...]
+
+
+class Asked(NamedTuple):
+    """What a coat was laid for; it is laid again when any of it is another object. `frame` where it moves by itself."""
+
+    coat: FeatherCoat
+    keys: Groom | None
+    item: MeshObject
+    points: NDArray[np.float32]
+    frame: float | None
+
+    def same(self, other: Asked) -> bool:
+        """True when feathers laid for one are those of the other."""
+        return (
+            self.coat is other.coat and self.keys is other.keys and self.item.mesh is other.item.mesh
+            and self.points is other.points and self.frame == other.frame
+        )
+
+
+class LiveFeathers:
+    """The coats of a document. Mutable; only the functions it hands out run on other threads, one for a coat."""
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+        self._plumages: dict[int, object] = {}  # core.feather.coat.plumage.Plumage, whose kernels load with the first
+        self._laid: dict[int, tuple[Asked, FeatherPicture]] = {}
+
+    def follow(self, document: Document) -> None:
+        """Forget the coats that are gone."""
+        alive = {coat.id for coat in document.feathers}
+        self._plumages = {k: plumage for k, plumage in self._plumages.items() if k in alive}
+        self._laid = {k: laid for k, laid in self._laid.items() if k in alive}
+
+    def wanted(
+        self, document: Document, posed: Callable[[MeshObject], Posed], meshes: Iterable[MeshObject], frame: float
+    ) -> list[tuple[Asked, Callable[[], FeatherPicture]]]:
+        """Coats that are not laid as they should be, each with the function that lays it."""
+        found: list[tuple[Asked, Callable[[], FeatherPicture]]] = []
+        for asked in self._asked(document, posed, meshes, frame):
+            laid = self._laid.get(asked.coat.id)
+            if laid is None or not laid[0].same(asked):
+                found.append((asked, partial(self._lay, asked, document, frame)))
+        return found
+
+    def adopt(self, asked: Asked, picture: FeatherPicture) -> None:
+        """Show a coat that was laid."""
+        self._laid[asked.coat.id] = asked, picture
+
+    def shown(
+        self, document: Document, posed: Callable[[MeshObject], Posed], meshes: Iterable[MeshObject]
+    ) -> dict[int, list[FeatherPicture]]:
+        """Pictures by the id of their mesh: those laid on the skin as it now is, be what they were laid for older."""
+        found: dict[int, list[FeatherPicture]] = {}
+        for item in meshes:
+            for coat in document.feathers:
+                laid = self._laid.get(coat.id)
+                if coat.mesh_id == item.id and not coat.hidden and laid and laid[0].points is posed(item).points:
+                    found.setdefault(item.id, []).append(laid[1])
+        return found
+
+    def _asked(
+        self, document: Document, posed: Callable[[MeshObject], Posed], meshes: Iterable[MeshObject], frame: float
+    ) -> Iterable[Asked]:
+        ids = {item.id for item in meshes}
+        for coat in document.feathers:
+            if coat.hidden or coat.mesh_id not in ids:
+                continue
+            from core.feather.coat.plumage import moving  # with the kernels of coats, which a window starts without
+
+            item = find_mesh(document, coat.mesh_id)
+            by_itself = frame if coat.proxies or moving(coat) else None
+            yield Asked(coat, keys_of(document, coat), item, posed(item).points, by_itself)
+
+    def _lay(self, asked: Asked, document: Document, frame: float) -> FeatherPicture:
+        from core.feather.coat.picture import coat_meshes
+        from core.feather.coat.plumage import Plumage
+
+        coat, mesh = asked.coat, asked.item.mesh
+        plumage = self._plumages.setdefault(coat.id, Plumage(self._evaluator))
+        assert isinstance(plumage, Plumage)
+        still = asked.points is mesh.points
+        skin = skin_at_rest(mesh, self._evaluator) if still else skin_posed(mesh, asked.points, self._evaluator)
+        laid = plumage.at_frame(coat, asked.keys, mesh, skin, frame, float(document.first_frame))
+        return FeatherPicture(coat_meshes(laid, coat, FINE), coat_meshes(laid, coat, QUICK))
