@@ -34,8 +34,9 @@ PARTS: dict[str, tuple[Part, ...]] = {
         Part("add_dial", "Controls"), Part("limit_joint", "Joints"), Part("mirror_weights", "Skin weights"),
         Part("clear_mask", "Mask")),
     "match": (
-        Part("forward"), Part("features"), Part("key", "Keys of tracks"), Part("delete"), Part("select_all"),
-        Part("next_key"), Part("nudge_left", "Nudge"), Part("next_plate")),
+        Part("forward"), Part("features"), Part("solve"), Part("cube", "Solved camera"), Part("delete_shapes"),
+        Part("key", "Keys of tracks"), Part("delete"), Part("select_all"), Part("next_key"),
+        Part("nudge_left", "Nudge"), Part("next_plate")),
     "window": (
         Part("craft_groom"), Part("shelf", "Panels"), Part("palette"), Part("theme"), Part("preferences"),
         Part("reset_layout")),

@@ -76,6 +76,11 @@ class LineUp(Record):
         if len(self.axis) not in (0, 2) or len(self.distance) not in (0, 2) or len(self.ground) in (1, 2):
             raise ValueError("LineUp must name two tracks of an axis and of a distance, three of the ground or more")
 
+    @property
+    def said(self) -> bool:
+        """Whether anything is said."""
+        return bool(self.origin or self.axis or self.ground or self.distance)
+
 
 class SolvedCamera(Record):
     """A camera of a plate, and where its tracks are.
@@ -174,13 +179,24 @@ def cube_edges(solved: SolvedCamera, track_id: int, sides: int = 8) -> Array:
     at = np.flatnonzero(solved.track_ids == track_id)
     if not len(at):
         raise UserError("The track has no place in space: solve again, or choose one that the solve holds.")
-    centres = -np.einsum("fji,fj->fi", solved.rotation, solved.translation)
-    half = float(np.median(np.linalg.norm(solved.points - centres.mean(axis=0), axis=1))) / 24.0
+    half = 0.5 * object_size(solved)
     corner = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 0) for z in (-1, 1)], np.float64) * half
     pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
     along = np.linspace(0.0, 1.0, sides)[None, :, None]
     a, b = (corner[[pair[k] for pair in pairs]][:, None, :] for k in (0, 1))
     return np.asarray(solved.points[at[0]] + a + (b - a) * along)
+
+
+def object_size(solved: SolvedCamera) -> float:
+    """How large a test object is: a twelfth of the middle distance of points from the cameras."""
+    centres = -np.einsum("fji,fj->fi", solved.rotation, solved.translation)
+    return float(np.median(np.linalg.norm(solved.points - centres.mean(axis=0), axis=1))) / 12.0
+
+
+def world_axes(solved: SolvedCamera, sides: int = 8) -> Array:
+    """(3, sides, 3) x, y and z of the artist's world, y up, from its origin, as long as two test objects."""
+    ways = np.diag([1.0, -1.0, -1.0])  # the world of a solve is y down
+    return np.asarray(2.0 * object_size(solved) * ways[:, None, :] * np.linspace(0.0, 1.0, sides)[None, :, None])
 
 
 def frozen(values: object, dtype: type = np.float64) -> np.ndarray:

@@ -8,7 +8,7 @@ from core.document import Document
 from core.errors import UserError
 from core.formats.project import read_project, write_project
 from core.image.plate import Plate
-from core.match.solved import SolvedCamera, frozen, pixels_of
+from core.match.solved import SolvedCamera, frozen, pixels_of, world_axes
 from core.match.track import keyed_track
 from tests.core.match.test_solved import small_solve
 from tools.line_up_edits import forget_line_up, set_axis, set_distance, set_ground, set_origin
@@ -54,6 +54,10 @@ def test_ground_axis_origin_and_distance_hold_and_no_point_moves_in_the_picture(
     for frame, seen in zip((1, 2), before, strict=True):
         np.testing.assert_allclose(pixels_of(now.solves[0], frame, now.solves[0].points), seen, atol=1e-8)
     np.testing.assert_allclose(up(set_origin(now, 4))[3], 0.0, atol=1e-9)
+    ends = world_axes(now.solves[0])[:, -1] * [1, -1, -1]
+    np.testing.assert_allclose(ends, ends[0, 0] * np.eye(3), atol=1e-12)
+    assert now.solves[0].line_up.said
+    assert not document.solves[0].line_up.said
 
 
 def test_a_new_solve_keeps_the_world_and_one_that_lost_the_line_up_tracks_stays_too(document: Document) -> None:
