@@ -26,13 +26,15 @@ def command(
     zoom: Annotated[bool, typer.Option("--zoom", help="The focal length changes over the shot.")] = False,
     lens: Annotated[str, typer.Option(help="Find the bend of the lens too: brown, fisheye, or of 3DEqualizer radial4 and anamorphic4.")] = "none",
     nodal: Annotated[bool, typer.Option("--nodal", help="The camera only turns, as on a tripod.")] = False,
+    readout: Annotated[float, typer.Option(min=-1.5, max=1.5, help="Rolling shutter: the part of a frame in which all rows are read, from above.")] = 0.0,
+    free_readout: Annotated[bool, typer.Option("--free-readout", help="Find that part too, from --readout if it is given.")] = False,
     known: Annotated[Path | None, typer.Option(help="Hold the solve to survey points, .csv of name, x, y, z, sigma; or to constraints, .json.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page that says how good the solve is and what to mend: .html.")] = None,
     size: Annotated[str | None, typer.Option(help="Size of the plate where the file does not say, as 1920x1080.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Find the camera, and where the tracked points are, from their tracks."""
-    asked = options_of(focal_px, free_focal, zoom, nodal, lens)
+    asked = options_of(focal_px, free_focal, zoom, nodal, lens)._replace(readout=readout, free_readout=free_readout)
     outputs = list(output or ())
     check_outputs(outputs, report)
     telling = Report(as_json)

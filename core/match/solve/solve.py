@@ -15,6 +15,7 @@ from core.match.solve.bundle import POSE, TURN, Free, adjust
 from core.match.solve.first import Cameras, Grower, best_pairs, keyframes, rays, triangulated
 from core.match.solve.floor import noise_floor
 from core.match.solve.nodal import solve_nodal
+from core.match.solve.rolling import Motion, found_readout, motion, unrolled
 from core.match.solve.slides import correlation, sliding
 from core.match.solve.state import (
     FOCAL,
@@ -53,7 +54,8 @@ ROUNDS, REFOCUSED = 2, 0.002  # of a camera whose distortion was taken out at a 
 
 class Options(NamedTuple):
     """focal : pixels, or None. free_focal : find it too. zoom : it changes from frame to frame.
-    distortion : find the bend of the lens too. nodal : the camera only turns. lens : a model of core/match/lens.py."""
+    distortion : find the bend of the lens too. nodal : the camera only turns. lens : a model of core/match/lens.py.
+    readout : share of a frame in which a rolling shutter reads all rows, from above. free_readout : find it too."""
 
     focal: float | None = None
     free_focal: bool = False
@@ -61,6 +63,8 @@ class Options(NamedTuple):
     distortion: bool = False
     nodal: bool = False
     lens: str = "brown"
+    readout: float = 0.0
+    free_readout: bool = False
 
 
 AS_GIVEN = Options()
@@ -157,6 +161,19 @@ def solve(
         if better is None:
             break
         found = _best(observations, frames, tracks, size, options, progress, better, guesses)
+    readout, sigma = options.readout, 0.0
+    for _ in range(ROUNDS if readout or options.free_readout else 0):
+        moving = motion(found.state, observations, frames, size[1], found.known)
+        if options.free_readout:
+            used = np.flatnonzero(found.used)
+            readout, sigma = found_readout(
+                found.state, observations.take(used), Motion(*(part[used] for part in moving)), found.free, readout,
+                found.sigma)
+        found = _best(
+            unrolled(observations, moving, readout), frames, tracks, size, options, progress, found.views, guesses)
+    if options.free_readout:
+        found = found._replace(said=(
+            *found.said, f"The shutter reads the picture in {readout:.3f} +- {sigma:.3f} of a frame."))
     return found
 
 
