@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.feather.coat.crossing import vane_boxes
-from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
+from core.feather.coat.layering import Crossings, Feathers, Layered, Limits, crossings, layer
 from core.feather.coat.plumage import Laid
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
 from core.workers import Workers
@@ -102,7 +102,8 @@ def instances(laid: Laid, workers: Workers, added: NDArray[np.float64] | None = 
     if added is not None:
         poses[:, [LIFT, ROLL]] += added[rows, :2]
         poses[:, LENGTH] *= added[rows, 2]
-    settled = _settled(rigid, poses, laid, workers, None if added is None else laid.give[rows])
+    limits = None if added is None else Limits(laid.give.lift[rows], laid.give.length[rows])
+    settled = _settled(rigid, poses, laid, workers, limits)
     feathers = rigid.feathers
     turns = quaternions(feathers.frames, settled.poses).astype(np.float32)
     scales = settled.poses[:, LENGTH].astype(np.float32)
@@ -151,11 +152,11 @@ def _rigid(laid: Laid, rows: NDArray[np.int32], workers: Workers) -> _Rigid:
 
 
 def _settled(
-    rigid: _Rigid, poses: NDArray[np.float64], laid: Laid, workers: Workers, most: NDArray[np.float64] | None
+    rigid: _Rigid, poses: NDArray[np.float64], laid: Laid, workers: Workers, limits: Limits | None
 ) -> Layered:
     near = np.full((len(poses), 1), -1, np.int32)  # nobody follows: each has its place already
     return layer(
-        rigid.feathers, poses, near, laid.skin.bvh, workers, may_shorten=most is None, bent_back=0.0, most=most)
+        rigid.feathers, poses, near, laid.skin.bvh, workers, bent_back=0.0, limits=limits)
 
 
 def _error(

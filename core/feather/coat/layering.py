@@ -51,6 +51,16 @@ class Layered(NamedTuple):
     second: NDArray[np.int32]
 
 
+class Limits(NamedTuple):
+    """What a frame of an animation may do to N feathers, so that none is seen to jump.
+
+    lift : (N,) float64, radians beyond the rest. length : (N,) float64, the least factor on its length.
+    """
+
+    lift: NDArray[np.float64]
+    length: NDArray[np.float64]
+
+
 class Crossings(NamedTuple):
     """What still passes through what: rows of feathers.
 
@@ -67,16 +77,15 @@ class Crossings(NamedTuple):
 
 def layer(
     feathers: Feathers, base: NDArray[np.float64], near: NDArray[np.int32], bvh: Bvh, workers: Workers,
-    may_shorten: bool = True, bent_back: float = BENT_BACK, most: NDArray[np.float64] | None = None,
+    bent_back: float = BENT_BACK, limits: Limits | None = None,
 ) -> Layered:
     """Settle a whole coat from its base poses (N, 6).
 
     near : (N, K) int32, neighbours on the skin, see ``ground``. bvh : the skin in the same pose.
-    may_shorten : at rest; in a frame of an animation only lifts change, as a length that changes would show.
     bent_back : share of an added lift that is bent back; 0 where shapes are given, as those of prototypes are.
-    most : (N,) float64, radians a feather may be lifted by; None for as much as it takes.
+    limits : of a frame of an animation, in which no feather rolls either; None at rest, for as much as it takes.
     """
-    poses = raised(feathers, base, near, bvh, workers, bent_back) if may_shorten else base.copy()
+    poses = raised(feathers, base, near, bvh, workers, bent_back) if limits is None else base.copy()
     vanes = pose_vanes(feathers.own, poses, feathers.roots, feathers.frames, ranges=workers.ranges)
     boxes = vane_boxes(vanes, workers.ranges)
     first, second = touching_boxes(_widened(boxes, poses))
@@ -86,7 +95,7 @@ def layer(
     suspects[first[meet]] = True
     suspects[second[meet]] = True
     suspects |= skin_crossings(vanes, boxes, bvh, ranges=workers.ranges)
-    _settle(feathers, laid, suspects, bvh, may_shorten, bent_back, most)
+    _settle(feathers, laid, suspects, bvh, bent_back, limits)
     return laid
 
 
@@ -114,7 +123,7 @@ def layer_again(
     suspects[fresh_first[meet]] = True
     suspects[fresh_second[meet]] = True
     suspects[changed] |= skin_crossings(vanes, boxes, bvh, changed, workers.ranges)
-    _settle(feathers, laid, suspects, bvh, True, BENT_BACK)
+    _settle(feathers, laid, suspects, bvh, BENT_BACK)
     return laid
 
 
@@ -140,7 +149,7 @@ def layer_around(
         poses=poses, vanes=vanes, boxes=boxes, first=np.concatenate([laid.first[kept], first]),
         second=np.concatenate([laid.second[kept], second]),
     )
-    _settle(feathers._replace(rank=rank), moved, suspects, bvh, True, BENT_BACK)
+    _settle(feathers._replace(rank=rank), moved, suspects, bvh, BENT_BACK)
     return moved
 
 
@@ -218,16 +227,18 @@ def _pairs_of(
 
 
 def _settle(
-    feathers: Feathers, laid: Layered, suspects: NDArray[np.bool_], bvh: Bvh, may_shorten: bool, bent_back: float,
-    most: NDArray[np.float64] | None = None,
+    feathers: Feathers, laid: Layered, suspects: NDArray[np.bool_], bvh: Bvh, bent_back: float,
+    limits: Limits | None = None,
 ) -> None:
     if not suspects.any():
         return
     rows = neighbour_rows(len(suspects), laid.first, laid.second)
     order = np.ascontiguousarray(np.lexsort((np.arange(len(suspects)), feathers.rank))[::-1], np.int32)
     moved = np.zeros(len(suspects), np.bool_)
+    count = len(suspects)
+    most, shortest = (np.full(count, np.inf), np.zeros(count)) if limits is None else limits
     settle_rows(
         order, feathers.rank, rows.start, rows.other, feathers.own, feathers.roots, feathers.frames, bvh.boxes,
-        bvh.children, bvh.corners, may_shorten, bent_back,
-        np.full(len(suspects), np.inf) if most is None else most, suspects, moved, laid.poses, laid.vanes, laid.boxes,
+        bvh.children, bvh.corners, limits is None, bent_back,
+        most, shortest, suspects, moved, laid.poses, laid.vanes, laid.boxes,
     )

@@ -16,12 +16,12 @@ from core import value as values
 from core.curve import Curve
 from core.evaluator import Evaluator
 from core.feather.coat.base import (
-    GIVE,
     YIELD,
     Base,
     Stand,
     changed_rows,
     curved,
+    giving,
     lie_down,
     limited,
     own_curves,
@@ -34,7 +34,7 @@ from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.frames import carried, field_frames, key_frames
 from core.feather.coat.ground import smoothed
 from core.feather.coat.keys import attributes_of_keys, interpolate, key_shapes
-from core.feather.coat.layering import Feathers, Layered, layer, layer_again
+from core.feather.coat.layering import Feathers, Layered, Limits, layer, layer_again
 from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import LENGTH, pose_vanes
@@ -68,7 +68,7 @@ class Laid(NamedTuple):
     bed: Bed
     skin: Skin
     fields: dict[str, Any]
-    give: NDArray[np.float64]
+    give: Limits
 
 
 class Plumage:
@@ -121,7 +121,7 @@ class Plumage:
             poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
             if coat.layered:
                 layered = layer(
-                    base.feathers, poses, bed.ground.near, skin.bvh, workers, may_shorten=False, most=base.give)
+                    base.feathers, poses, bed.ground.near, skin.bvh, workers, limits=base.give)
             else:
                 layered = _unlayered(base.feathers, poses, workers.ranges)
         if coat.proxies:
@@ -218,13 +218,13 @@ class Plumage:
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
         if skin is None:
             fields["limit"] = limited(fields["length"], bend_of)
-            stand = Stand(bed.positions, rest_frames, bend_of, fields["limit"], np.full(count, GIVE))
+            stand = Stand(bed.positions, rest_frames, bend_of, fields["limit"], giving(np.zeros(count)))
         else:
             positions, frames, flow = carried(mesh, bed, rest_frames, flow_frames, skin)
             bends = curved(positions, flow, near, ranges)
             # where the skin bends or stretches, feathers may rise; elsewhere so little that nothing is seen to jump
             strain = strained(bed.positions, flow_frames, positions, flow, near)
-            give = GIVE + YIELD * strain + fields["length"] * np.abs(bends - bend_of).max(axis=1)
+            give = giving(YIELD * strain + fields["length"] * np.abs(bends - bend_of).max(axis=1))
             stand = Stand(positions, frames, bends, fields["limit"], give)
         curves = self._remember("own curves", lambda: own_curves(own), own)
         return lie_down(coat, bed, stand, numbers, fields, own, curves, rank, sides)

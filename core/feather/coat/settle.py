@@ -26,7 +26,7 @@ from core.mesh.bvh_kernels import STACK_SIZE
 
 LIFTS = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 9.5, 12.5, 16.0])
 ROLLS = np.radians([0.0, 4.0, -4.0])
-LENGTHS = np.array([1.0, 0.87, 0.75, 0.64, 0.54, 0.45, 0.36, 0.28, 0.2, 0.1, 0.04, 0.01])
+LENGTHS = np.array([1.0, 0.87, 0.75, 0.64, 0.54, 0.45, 0.36, 0.28, 0.2, 0.1, 0.04, 0.01, 1e-3])
 BENT_BACK = 1.2  # of an added lift, taken back along the feather so that its tip does not stand out
 HALVINGS = 5
 
@@ -84,20 +84,22 @@ def _changed(base, lift, roll, length, bent_back, out):  # type: ignore[no-untyp
     types.void(
         I32_1D, types.Array(types.float64, 1, "C", readonly=True), I32_1D, I32_1D,
         F32_4D, F32_2D, F32_3D, F32_2D, I32_2D, F32_2D, types.boolean, types.float64,
-        types.Array(types.float64, 1, "C", readonly=True),
+        types.Array(types.float64, 1, "C", readonly=True), types.Array(types.float64, 1, "C", readonly=True),
         types.boolean[::1], types.boolean[::1], types.float64[:, ::1], types.float32[:, :, :, ::1],
         types.float32[:, :, ::1],
     ),
     cache=True, nogil=True,
 )
 def settle_rows(  # type: ignore[no-untyped-def]
-    order, rank, start, other, own_vanes, roots, frames, nodes, children, corners, may_shorten, bent_back, most,
-    suspect, moved, poses, vanes, boxes
+    order, rank, start, other, own_vanes, roots, frames, nodes, children, corners, may_roll, bent_back, most,
+    shortest, suspect, moved, poses, vanes, boxes
 ):
     """Settle the rows of `order` (n,) int32, lowest first.
 
     bent_back : share of an added lift that is taken back by bending the feather down; 0 keeps shapes as they are.
-    most : (N,) float64, radians a feather may be lifted by; what does not suffice then stays as it is.
+    may_roll : at rest; in a frame of an animation a roll would be seen as a jump.
+    most : (N,) float64, radians a feather may be lifted by. shortest : (N,) float64, the least factor on its length for
+        the sake of other feathers; to stay out of the skin it shrinks as far as it must.
     suspect : (N,) bool, found crossing (or to be looked at); moved : (N,) bool, written where a pose was changed.
     poses, vanes, boxes : as they are, written where they change.
     """
@@ -133,15 +135,23 @@ def settle_rows(  # type: ignore[no-untyped-def]
         if last == -1:
             continue
         base[:] = poses[i]
-        found = False
-        for a in range(len(LENGTHS) if may_shorten else 1):
+        found = in_skin = False
+        for a in range(len(LENGTHS)):
+            longer = LENGTHS[max(a - 1, 0)]
+            shorter = LENGTHS[a]
+            if longer > shortest[i]:
+                shorter = max(shorter, shortest[i])
+            elif a > 0:
+                if not in_skin:
+                    break
+                lower, upper = below[:0], above[:0]  # only the skin counts now
+                last = -3
             for b in range(len(LIFTS)):
                 if b > 0 and LIFTS[b - 1] >= most[i]:
                     break
                 lift = min(LIFTS[b], most[i])
-                # in a frame nothing may jump: a roll would
-                for c in range(len(ROLLS) if may_shorten and b % 2 == 0 else 1):
-                    _changed(base, lift, ROLLS[c], LENGTHS[a], bent_back, trial)
+                for c in range(len(ROLLS) if may_roll and b % 2 == 0 else 1):
+                    _changed(base, lift, ROLLS[c], shorter, bent_back, trial)
                     pose_vane(own_vanes[i], trial, roots[i], frames[i], vane)
                     strip_boxes(vane, own)
                     last = _blocked(
@@ -151,12 +161,18 @@ def settle_rows(  # type: ignore[no-untyped-def]
                         continue
                     found = True
                     best[:] = trial
-                    if b > 0 and c == 0:
-                        low, high = LIFTS[b - 1], lift
+                    # the least that clears follows a smooth motion smoothly: of the lift, or of what is cut off
+                    if c == 0 and (a > 0 or b > 0):
+                        low, high = 0.0, 1.0
                         hit = -3
                         for _ in range(HALVINGS):
                             middle = 0.5 * (low + high)
-                            _changed(base, middle, 0.0, LENGTHS[a], bent_back, trial)
+                            if b > 0:
+                                _changed(
+                                    base, LIFTS[b - 1] + middle * (lift - LIFTS[b - 1]), 0.0, shorter, bent_back, trial
+                                )
+                            else:
+                                _changed(base, lift, 0.0, longer + middle * (shorter - longer), bent_back, trial)
                             pose_vane(own_vanes[i], trial, roots[i], frames[i], vane)
                             strip_boxes(vane, own)
                             hit = _blocked(
@@ -172,10 +188,15 @@ def settle_rows(  # type: ignore[no-untyped-def]
                     break
             if found:
                 break
+            _changed(base, 0.0, 0.0, shorter, bent_back, trial)
+            pose_vane(own_vanes[i], trial, roots[i], frames[i], vane)
+            strip_boxes(vane, own)
+            in_skin = vane_meets_skin(vane, own, nodes, children, corners, stack, s, t)
         if not found:
-            if not may_shorten:
+            # where it would cross others it stays as it is, unless it is in the skin: then it gives way to that
+            best[:] = trial
+            if not in_skin and not vane_meets_skin(vanes[i], boxes[i], nodes, children, corners, stack, s, t):
                 continue
-            _changed(base, 0.0, 0.0, LENGTHS[-1], bent_back, best)
         poses[i] = best
         pose_vane(own_vanes[i], best, roots[i], frames[i], vanes[i])
         strip_boxes(vanes[i], boxes[i])

@@ -6,6 +6,7 @@ import pytest
 from core.evaluator import Evaluator
 from core.feather.coat.coat import AttributeValue, KeyAttributes
 from core.feather.coat.dress import dress_feathers
+from core.feather.coat.export import added_at_rest, instances
 from core.feather.coat.layering import crossings
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.posing import LENGTH, LIFT
@@ -176,3 +177,14 @@ def test_attributes_come_from_keys_and_from_expressions(bird):
     assert np.corrcoef(right, laid.fields["age"])[0, 1] > 0.95
     same = bird.rest(coat.replace(key_attributes=given.replace(values=np.full((len(ids), 1), 0.17, np.float32))))
     np.testing.assert_allclose(same.fields["vaneWidthLeft"], 0.17, atol=1e-6)
+
+
+def test_of_a_body_that_folds_hardly_any_feather_crosses_and_none_enters_the_skin(bird):
+    rest = bird.rest()
+    skin = bird.bent(3.5)
+    laid = bird.plumage.at_frame(bird.coat, bird.keys, bird.mesh, skin, 1010.0)
+    written = instances(laid, bird.evaluator.workers, added_at_rest(rest, bird.evaluator.workers))
+    assert len(crossing_by_solving(written.vanes)) <= 0.01 * written.left.pairs
+    triangles = skin.points[skin.triangles.vertices].astype(np.float64)
+    assert not any(meet(cells(vane), triangles) for vane in written.vanes[::7])
+    assert len(written.left.skin) == 0
