@@ -32,6 +32,7 @@ from app.window.files.file_actions import FileActions
 from app.window.files.opening import Opening
 from app.window.files.playblast import PlayblastDialog
 from app.window.files.recovery_bar import RecoveryBar
+from app.window.files.unit_bar import UnitBar
 from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
@@ -106,6 +107,8 @@ class MainWindow(QMainWindow):
         self.doors = Doors(self.desk, self.opening, lambda: self._settings.recent)
         self.middle = QStackedWidget()
         self.recovery = RecoveryBar(self.desk)
+        self.unit = UnitBar(self.desk, self.opening.read_as)
+        self.opening.unit_assumed.connect(self.unit.offer)
         self.crash = CrashBar(self.crash_watch)
         self.plugins = PluginBar(session.tools.troubles)
         self.status = StatusLine(self.desk, self.hotkeys)
@@ -181,7 +184,7 @@ class MainWindow(QMainWindow):
         down = QVBoxLayout(whole)
         down.setContentsMargins(0, 0, 0, 0)
         down.setSpacing(0)
-        for bar in (self.top, self.recovery, self.crash, self.plugins):
+        for bar in (self.top, self.recovery, self.unit, self.crash, self.plugins):
             down.addWidget(bar)
         over = QSplitter(Qt.Orientation.Vertical)
         over.setChildrenCollapsible(False)

@@ -54,9 +54,11 @@ class Opening(QObject):
     make : makes sessions. remember : called with every file that was opened. open_plate : opens a plate.
 
     opened : a document or a mesh came in; a view may frame it.
+    unit_assumed : after it, of a mesh whose file does not say its unit: path, MeshFile, the unit it was read with.
     """
 
     opened = Signal()
+    unit_assumed = Signal(object, object, str)
 
     def __init__(
         self, desk: Desk, parent: QWidget | None = None, make: MakeSession = Session,
@@ -143,16 +145,37 @@ class Opening(QObject):
 
         self._desk.jobs.start(f"Open {path.name}", lambda progress, cancelled: read_project(path, hashes), done)
 
-    def _read_mesh(self, path: Path, then: Callable[[Path, MeshFile], None]) -> None:
+    def read_as(self, path: Path, unit: str, up: str) -> None:
+        """Read the mesh that has just come in again, in this unit and with this axis up, in place of itself."""
+        before = self._desk.document
+
+        def instead(path: Path, found: MeshFile) -> None:
+            if self._desk.document is not before:
+                self._desk.error(UserError(f"The document was changed while {path.name} was read; import it again."))
+                return
+            if self._desk.session.history.undo_name is None:
+                self._open_mesh(path, found)
+                return
+            self._desk.session.undo()
+            self._import_mesh(path, found)
+
+        self._read_mesh(path, instead, unit, up)
+
+    def _read_mesh(
+        self, path: Path, then: Callable[[Path, MeshFile], None], unit: str | None = None, up: str | None = None
+    ) -> None:
         def done(found: MeshFile) -> None:
             then(path, found)
             self._remember(path)
             if found.notes:
-                self._desk.said.emit(" ".join(found.notes))
+                self._desk.said.emit(" ".join(without_options(note) for note in found.notes))
             self.opened.emit()
+            if found.unit_source != "file":
+                self.unit_assumed.emit(path, found, unit or "m")
 
         self._desk.jobs.start(
-            f"Read {path.name}", lambda progress, cancelled: read_mesh(path, cancel=cancelled), done)
+            f"Read {path.name}",
+            lambda progress, cancelled: read_mesh(path, unit=unit, up=up, cancel=cancelled), done)
 
     def _read_rig(self, path: Path, new: bool) -> None:
         """Open a rig in the craft of posing; a file of the format in which nothing moves is a mesh."""
@@ -170,7 +193,7 @@ class Opening(QObject):
             self._desk.set_craft("pose")
             self._remember(path)
             if found.notes:
-                self._desk.said.emit(" ".join(found.notes))
+                self._desk.said.emit(" ".join(without_options(note) for note in found.notes))
             self.opened.emit()
 
         def work(progress: Progress, cancelled: Asked) -> RigFile | None:
@@ -260,6 +283,12 @@ def with_mesh_to_plant(document: Document, mesh: Mesh, name: str, source: str = 
     """The document with a mesh (of a file) and an empty groom on it, so that a hand can plant at once."""
     added = add_mesh(document, mesh, name, source)
     return add_empty_groom(added, added.meshes[-1].id, "coat")
+
+
+def without_options(note: str) -> str:
+    """A note of a reader without the options of the command line that would change what it tells."""
+    words, found, _ = note.partition("; set --")
+    return words + "." if found else note
 
 
 def filter_of(words: str, suffixes: Sequence[str]) -> str:
