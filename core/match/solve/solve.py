@@ -265,8 +265,6 @@ def _check(observations: Observations, frames: Rows, tracks: int, views: Views) 
         raise UserError("The tracks are on one frame only; a camera needs two frames at least, better twenty.")
     if not np.isfinite(observations.xy).all():
         raise UserError("The tracks hold places that are not numbers; track them again.")
-    if len(views.cameras) == 1:
-        _check_places(observations, views.cameras[0].size)
     long = np.bincount(observations.track, minlength=tracks) >= 2
     least = LEAST_PICKS if views.alone.all() else LEAST_TRACKS
     if long.sum() < least:
@@ -274,6 +272,8 @@ def _check(observations: Observations, frames: Rows, tracks: int, views: Views) 
             f"{int(long.sum())} tracks are seen on two frames or more; a camera needs {least} at least, better "
             "twenty, spread over the picture and over near and far."
         )
+    if len(views.cameras) == 1:
+        _check_places(observations, views.cameras[0].size)
 
 
 def _check_places(observations: Observations, size: tuple[int, int]) -> None:
