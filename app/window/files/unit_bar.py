@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +33,7 @@ class UnitBar(NoticeBar):
         self._path, self._unit, self._up = Path(), "m", "y"
         for label, unit in UNITS.items():
             self.button(label, f"Reads the mesh again as one made in {label.lower()}, in place of this one.",
-                        lambda unit=unit: self._answer(unit, self._up))
+                        partial(self._made_in, unit))
         self.turn_button = self.button(
             "Turn upright", "Reads the mesh again with its other axis up: Z in place of Y, or back to Y.",
             lambda: self._answer(self._unit, NEW_UP[self._up]))
@@ -48,6 +49,9 @@ class UnitBar(NoticeBar):
             self.buttons[label].setVisible(name != unit)
         self.tell(f"{path.name} does not say its unit: read in {word}, {found.up.upper()} up, it is "
                   f"{x:.3g} × {y:.3g} × {z:.3g} m. It was made in:")
+
+    def _made_in(self, unit: str) -> None:
+        self._answer(unit, self._up)
 
     def _answer(self, unit: str, up: str) -> None:
         self.hide()
