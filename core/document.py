@@ -213,6 +213,11 @@ def with_groom(document: Document, groom: Groom) -> Document:
     return document.replace(grooms=_put(document.grooms, groom))
 
 
+def feathers_of(document: Document, groom: Groom | None) -> FeatherCoat | None:
+    """The coat of feathers whose keys a groom holds, or None."""
+    return None if groom is None else next((c for c in document.feathers if c.keys_id == groom.id), None)
+
+
 def with_feathers(document: Document, coat: FeatherCoat) -> Document:
     """The document with `coat` in place of the feathers of the same id, or added at the end."""
     return document.replace(feathers=_put(document.feathers, coat))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from core.document import (
     Document,
     MeshObject,
+    find_feathers,
     find_groom,
     find_mesh,
     free_id,
@@ -211,6 +212,13 @@ def add_empty_groom(document: Document, mesh_id: int, name: str = "groom", point
     size = float(np.linalg.norm(np.ptp(points_at_rest, axis=0))) if len(points_at_rest) else 0.0
     coat = Coat(reach=min(float(f"{FIRST_REACH * size:.2g}"), LONGEST))
     return add_groom(document, Groom(id=0, name=_name(name), mesh_id=mesh_id, guides=no_guides(points), coat=coat))
+
+
+def remove_plumage(document: Document, coat_id: int) -> Document:
+    """The document without a coat of feathers and the groom of its keys."""
+    coat = find_feathers(document, coat_id)
+    without = document.replace(feathers=tuple(c for c in document.feathers if c.id != coat_id))
+    return without if coat.keys_id is None else without_groom(without, coat.keys_id)
 
 
 def remove_groom(document: Document, groom_id: int) -> Document:

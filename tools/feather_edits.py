@@ -11,7 +11,7 @@ from core.document import Document, find_feathers, find_mesh, free_id, keys_of, 
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat, Placement, Stroke, Tract
-from core.feather.coat.dress import KEYS, dress_feathers
+from core.feather.coat.dress import KEYS, Dressed, dress_feathers
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.proxy import demoted, keyed, promoted
 from core.record import freeze
@@ -23,7 +23,12 @@ def add_feathers(
 ) -> Document:
     """The document with a coat of exactly `count` feathers on a mesh, and a groom of its keys to comb; for a job."""
     item = find_mesh(document, mesh_id)
-    dressed = dress_feathers(item.mesh, evaluator, count, preset, placement, keys, seed, mesh_id=mesh_id)
+    return with_dressed(
+        document, dress_feathers(item.mesh, evaluator, count, preset, placement, keys, seed, mesh_id=mesh_id))
+
+
+def with_dressed(document: Document, dressed: Dressed) -> Document:
+    """The document with a first coat of feathers and the groom of its keys, which :func:`dress_feathers` made."""
     groom = dressed.keys.replace(id=free_id(document.grooms))
     coat = dressed.coat.replace(id=free_id(document.feathers), keys_id=groom.id)
     return with_feathers(with_groom(document, groom), coat)

@@ -9,8 +9,11 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from app.window.desk import Desk
 from app.window.params_panel import RecordForm, Setting
 from app.window.sections import FoldMemory, Section
-from core.document import Document, find_groom, with_groom
-from core.groom.groom import COAT_FIELDS, NAMES, Coat
+from core.document import Document, feathers_of, find_feathers, find_groom, with_feathers, with_groom
+from core.feather.coat.coat import NAMES as FEATHER_NAMES
+from core.feather.coat.coat import FeatherCoat
+from core.field import fields_of
+from core.groom.groom import NAMES, Coat
 from core.record import Record
 from core.workspace import Respect, Workspace
 
@@ -132,7 +135,8 @@ class RespectPanel(_Panel):
 
 
 class CoatPanel(_Panel):
-    """What the hairs of the active groom are like: a drag is a preview, its end one named step."""
+    """What the hairs of the active groom are like, or the feathers whose keys it holds: a drag is a preview, its end
+    one named step."""
 
     def __init__(self, desk: Desk, memory: FoldMemory | None = None) -> None:
         super().__init__("Coat", desk, memory, "coat")
@@ -147,33 +151,42 @@ class CoatPanel(_Panel):
             if self.form is not None or self._layout().count() == 0:
                 self.show_words("No groom yet. Plant or scatter guides on a mesh and the coat grows from them.")
             return
-        maps = tuple(m.name for m in groom.maps)
-        self.show_record(groom.id, groom.coat, Setting(
-            self.unit, self.desk.workspace.frame, NAMES, maps))
+        maps, frame = tuple(m.name for m in groom.maps), self.desk.workspace.frame
+        feathers = feathers_of(self.desk.document, groom)
+        self.set_title("Coat" if feathers is None else "Feathers")
+        if feathers is None:
+            self.show_record(groom.id, groom.coat, Setting(self.unit, frame, NAMES, maps))
+        else:
+            self.show_record(groom.id, feathers, Setting(self.unit, frame, FEATHER_NAMES, maps))
 
-    def edited(self, coat: Coat, final: bool) -> None:
+    def edited(self, coat: Coat | FeatherCoat, final: bool) -> None:
         session, groom = self.desk.session, self.desk.groom
         if groom is None:
             return
-        committed = find_groom(session.history.current, groom.id)
+        committed: Coat | FeatherCoat = find_groom(session.history.current, groom.id).coat
+        if isinstance(coat, FeatherCoat):
+            committed = find_feathers(session.history.current, coat.id)
         if not final:
             self.desk.attempt(lambda: session.preview(_with_coat(session.document, groom.id, coat)))
-        elif coat is committed.coat:
+        elif coat is committed:
             session.cancel()
         else:
-            self.desk.edit(f"Coat {_changed_label(committed.coat, coat)}", _with_coat, groom.id, coat)
+            what = "Feathers" if isinstance(coat, FeatherCoat) else "Coat"
+            self.desk.edit(f"{what} {_changed_label(committed, coat)}", _with_coat, groom.id, coat)
             self.refresh()  # what was refused goes back to what it was
 
     def _document_changed(self, old: Document, new: Document) -> None:
-        if old.grooms is not new.grooms or old.unit != new.unit:
+        if old.grooms is not new.grooms or old.feathers is not new.feathers or old.unit != new.unit:
             self.refresh()
 
 
-def _with_coat(document: Document, groom_id: int, coat: Coat) -> Document:
+def _with_coat(document: Document, groom_id: int, coat: Coat | FeatherCoat) -> Document:
+    if isinstance(coat, FeatherCoat):
+        return with_feathers(document, coat)
     return with_groom(document, find_groom(document, groom_id).replace(coat=coat))
 
 
-def _changed_label(old: Coat, new: Coat) -> str:
-    labels = [known.label.lower() for name, known in COAT_FIELDS.items()
+def _changed_label(old: Record, new: Record) -> str:
+    labels = [known.label.lower() for name, known in fields_of(type(new)).items()
               if getattr(old, name) is not getattr(new, name)]
     return labels[0] if len(labels) == 1 else f"{len(labels)} values"

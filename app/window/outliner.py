@@ -18,12 +18,14 @@ from PySide6.QtWidgets import (
 )
 
 from app.window.desk import Desk
+from app.window.feather_coats import FEATHERS, dress_with_feathers
 from app.window.icons import icon, paint_icon
 from app.window.jobs import Asked, Progress
 from app.window.scene_model import ITEM, Item, SceneModel, counted
 from app.window.theme import look_of, text_font
-from core.document import Document, MeshObject, find_mesh
+from core.document import Document, MeshObject, feathers_of, find_mesh
 from core.errors import UserError
+from core.feather.presets import bird_names, load_bird
 from core.groom.groom import Groom
 from core.groom.style import load_style, style_names
 from core.workspace import Workspace
@@ -33,6 +35,7 @@ from tools.document_edits import (
     dressed,
     remove_groom,
     remove_mesh,
+    remove_plumage,
     set_groom_hidden,
     set_groom_locked,
     set_mesh_hidden,
@@ -288,9 +291,11 @@ class Outliner(QTreeView):
         self._desk.edit("Unlock" if item.locked else "Lock", change, item.id, not item.locked)
 
     def delete(self, item: Item | None) -> None:
-        """Delete a mesh with its grooms, or a groom; undo brings it back."""
+        """Delete a mesh with its grooms, or a groom with the feathers it holds the keys of; undo brings it back."""
         if isinstance(item, MeshObject):
             self._desk.edit("Delete mesh", remove_mesh, item.id)
+        elif (feathers := feathers_of(self._desk.document, item)) is not None:
+            self._desk.edit("Delete feathers", remove_plumage, feathers.id)
         elif item is not None:
             self._desk.edit("Delete groom", remove_groom, item.id)
 
@@ -382,6 +387,11 @@ class Outliner(QTreeView):
         for style in style_names():
             add(more, style.capitalize(), None, load_style(style).description,
                 lambda style=style: self.add_groom(mesh, style))
+        birds = menu.addMenu(icon("plus"), "Dress with feathers")
+        birds.setToolTipsVisible(True)
+        for bird in bird_names():
+            add(birds, load_bird(bird).title, None, f"{FEATHERS:,} feathers that follow keys you comb like guides.",
+                lambda bird=bird: dress_with_feathers(self._desk, mesh, bird, self))
         menu.addSeparator()
         add(menu, "Delete\tDel", "delete", "Takes it out of the document; undo brings it back.",
             lambda: self.delete(item))
@@ -402,4 +412,5 @@ def _about(item: Item | None) -> str:
         moves = ", moved by a rig" if item.rig is not None else ""
         return (f"{item.name}: {counted(item)}, {len(item.mesh.points):,} vertices{moves}. "
                 "Double click renames, dragging reorders, eye and lock are at the right.")
-    return f"{item.name}: {counted(item)}, {item.coat.count:,} hairs. Click to work on it with the tools."
+    hairs = f", {item.coat.count:,} hairs" if item.coat.count else ""
+    return f"{item.name}: {counted(item)}{hairs}. Click to work on it with the tools."

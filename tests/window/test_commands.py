@@ -77,7 +77,7 @@ BEFORE = {
     "groom.wash_all": "groom.spray_selected"}
 
 
-OWN_FILES = ("Pose", "Match")  # categories whose steps have tests of their own
+OWN_FILES = ("Pose", "Match", "Feathers")  # categories whose steps have tests of their own
 STEPS = [c for c in TABLE if c.undo is not None and c.name not in ASKING and c.category not in OWN_FILES]
 
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from core.feather.presets import bird_names
 from core.field import field, fields_of
 from core.mesh.roots import Roots
 from core.record import Record, column, number, text
@@ -145,7 +146,10 @@ class FeatherCoat(Record):
     name: str
     mesh_id: int
     keys_id: int | None = None
-    preset: str = "goldfinch"
+    preset: Annotated[str, field(
+        "Bird", "The bird whose feathers these are: their form and colours on every part of the body.",
+        choices=tuple(bird_names()),
+    )] = "goldfinch"
     placements: tuple[Placement, ...] = (Placement(),)
     tracts: tuple[Tract, ...] = ()
     strokes: tuple[Stroke, ...] = ()

@@ -1,0 +1,97 @@
+"""What the window does to coats of feathers. Their edits come with kernels, so they are loaded when first asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject
+
+from app.window.commands import Command, Window
+from app.window.desk import Desk
+from app.window.jobs import Asked, Progress
+from core.document import MeshObject, feathers_of
+from core.errors import UserError
+from core.feather.presets import bird_names
+from tools.scene import active_mesh
+
+if TYPE_CHECKING:
+    from core.feather.coat.dress import Dressed
+
+FEATHERS = 4_000  # of a first coat
+
+
+def dress_with_feathers(desk: Desk, item: MeshObject, bird: str, owner: QObject | None = None) -> None:
+    """Lay a first coat of a bird's feathers on a mesh, with keys to comb, beside the window."""
+    evaluator = desk.session.evaluator
+
+    def work(progress: Progress, cancelled: Asked) -> Dressed:
+        from core.feather.coat.dress import dress_feathers
+
+        return dress_feathers(item.mesh, evaluator, FEATHERS, bird, mesh_id=item.id)
+
+    def put(dressed: Dressed) -> None:
+        from tools.feather_edits import with_dressed
+
+        if all(other.mesh is not item.mesh for other in desk.document.meshes):
+            raise UserError(f"The mesh {item.name} was changed meanwhile; dress it again.")
+        if desk.edit("Dress with feathers", with_dressed, dressed):
+            desk.set_workspace(groom=desk.document.grooms[-1].id)
+
+    desk.jobs.start(f"Dress {item.name} with feathers", work, put, owner=owner)
+
+
+def _dress(window: Window) -> None:
+    mesh = active_mesh(window.desk.document, window.desk.workspace)
+    if mesh is not None:
+        dress_with_feathers(window.desk, mesh, bird_names()[0])
+
+
+def _hide(window: Window) -> None:
+    from tools.feather_edits import set_feathers
+
+    coat = feathers_of(window.desk.document, window.desk.groom)
+    if coat is not None:
+        step = "Show feathers" if coat.hidden else "Hide feathers"
+        window.desk.edit(step, set_feathers, coat.id, hidden=not coat.hidden)
+
+
+def _remove(window: Window) -> None:
+    from tools.feather_edits import remove_feathers
+
+    coat = feathers_of(window.desk.document, window.desk.groom)
+    if coat is not None:
+        window.desk.edit("Remove feathers", remove_feathers, coat.id)
+
+
+def _needs_mesh(desk: Desk) -> str | None:
+    return None if desk.session.document.meshes else "There is no mesh yet: open or import one first."
+
+
+def _needs_feathers(desk: Desk) -> str | None:
+    if feathers_of(desk.document, desk.groom) is not None:
+        return None
+    return "No feathers are chosen: dress a mesh with feathers, or choose their keys in the scene."
+
+
+def _are_hidden(desk: Desk) -> bool:
+    coat = feathers_of(desk.document, desk.groom)
+    return coat is not None and coat.hidden
+
+
+FEATHER_COATS: tuple[Command, ...] = (
+    Command(
+        "feathers.dress", "Dress with feathers",
+        "Lays a first coat of feathers on the active mesh, with keys that you comb like guides.",
+        _dress, "tools.feather_edits.add_feathers", "document", "Dress with feathers", _needs_mesh,
+        icon="plus", words="bird plumage coat wing new create"),
+    Command(
+        "feathers.hide", "Hide the feathers",
+        "Leaves the feathers of the active keys out of the view and exports; again shows them.",
+        _hide, "tools.feather_edits.set_feathers", "document", "Hide feathers", _needs_feathers,
+        _are_hidden, "eye-off", words="show bird plumage invisible"),
+    Command(
+        "feathers.remove", "Remove the feathers",
+        "Takes the feathers off the active mesh and leaves the groom of their keys.",
+        _remove, "tools.feather_edits.remove_feathers", "document", "Remove feathers", _needs_feathers,
+        icon="minus", words="delete bird plumage coat"),
+)

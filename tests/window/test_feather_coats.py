@@ -1,0 +1,85 @@
+"""Feathers in the window: laid beside it, changed by the panel of their keys, taken away; undo takes all of it back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.window import feather_coats
+from app.window.commands import Window
+from app.window.craft_panels import CoatPanel
+from app.window.desk import Desk
+from app.window.outliner import Outliner
+from core.document import Document, MeshObject
+from core.value import constant
+from tests.core.feather.coat.bodies import egg
+from tools.session import Session
+
+COUNT = 60
+
+
+@pytest.fixture
+def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+    """An egg that was dressed as an owl."""
+    monkeypatch.setattr(feather_coats, "FEATHERS", COUNT)
+    desk = Desk(Session(Document(meshes=(MeshObject(id=1, name="egg", mesh=egg()),))))
+    feather_coats.dress_with_feathers(desk, desk.document.meshes[0], "owl")
+    qtbot.waitUntil(lambda: bool(desk.document.feathers), timeout=120_000)
+    yield desk
+    assert desk.jobs.close()
+    desk.session.close(discard=True)
+
+
+def test_feathers_of_a_bird_come_with_keys_at_hand_as_one_step(desk: Desk) -> None:
+    coat = desk.document.feathers[0]
+    assert coat.preset == "owl"
+    assert sum(placement.count for placement in coat.placements) == COUNT
+    assert desk.groom is not None
+    assert coat.keys_id == desk.groom.id
+    assert desk.session.history.undo_name == "Dress with feathers"
+    desk.session.undo()
+    assert desk.document.feathers == ()
+    assert desk.document.grooms == ()
+
+
+def test_the_panel_of_keys_is_that_of_their_feathers(desk: Desk, qtbot: QtBot) -> None:
+    panel = CoatPanel(desk)
+    qtbot.addWidget(panel)
+    assert panel.title == "Feathers"
+    coat = desk.document.feathers[0]
+    assert panel.form is not None
+    assert panel.form.record() is coat
+    longer = constant(1.5)
+    panel.edited(coat.replace(length=longer), True)
+    assert desk.document.feathers[0].length is longer
+    assert desk.session.history.undo_name == "Feathers length"
+    assert panel.form.record() is desk.document.feathers[0]
+
+
+def test_deleting_the_keys_takes_their_feathers_too(desk: Desk, qtbot: QtBot) -> None:
+    tree = Outliner(desk)
+    qtbot.addWidget(tree)
+    tree.delete(desk.groom)
+    assert desk.document.feathers == ()
+    assert desk.document.grooms == ()
+    desk.session.undo()
+    assert len(desk.document.feathers) == 1
+
+
+def test_commands_hide_and_remove_what_the_keys_at_hand_hold(desk: Desk) -> None:
+    window = cast(Window, SimpleNamespace(desk=desk))
+    dress, hide, remove = feather_coats.FEATHER_COATS
+    assert dress.enabled(desk) is None
+    assert hide.checked is not None
+    for hidden in (True, False):
+        hide.run(window)
+        assert desk.document.feathers[0].hidden == hide.checked(desk) == hidden
+    remove.run(window)
+    assert desk.session.history.undo_name == remove.undo
+    assert desk.document.feathers == ()
+    assert hide.enabled(desk) is not None
+    assert desk.groom is not None
