@@ -31,6 +31,7 @@ class MeshObject(Record):
 
     id : stable, unique in the document.
     source : path of the file it was read from, to read it again when it was updated; "" for none.
+    source_unit, source_up : metres per unit and up axis it was read with when a hand gave them; 0 and "" otherwise.
     rig : what moves it, or None for a mesh at rest.
     correctives : what was sculpted at poses of the rig, or None.
     pose : the pose held in the view, None for the clip at the frame. library : poses kept for later, by name.
@@ -44,6 +45,8 @@ class MeshObject(Record):
     name: str
     mesh: Mesh
     source: str = ""
+    source_unit: float = 0.0
+    source_up: str = ""
     rig: Rig | None = None
     correctives: Correctives | None = None
     pose: Pose | None = None
@@ -63,6 +66,9 @@ class MeshObject(Record):
         text(self, "name")
         if self.source:
             text(self, "source", longest=4096)
+        number(self, "source_unit", least=0.0, most=1e9)
+        if self.source_up not in ("", "y", "z"):
+            raise ValueError("MeshObject.source_up must be y, z or nothing")
         number(self, "id", least=0, most=2**31 - 1)
         if self.rig is not None and len(self.rig.skin.joints) != len(self.mesh.points):
             raise ValueError(f"MeshObject.rig moves {len(self.rig.skin.joints)} vertices of {len(self.mesh.points)}")

@@ -28,7 +28,7 @@ from core.document import (
 )
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.formats.mesh_file import read_mesh
+from core.formats.mesh_file import MeshFile, read_mesh
 from core.formats.picture import read_picture
 from core.groom.dress import Stage, dress, no_stages
 from core.groom.groom import COAT_VALUES, LONGEST, Coat, Groom, Map
@@ -55,16 +55,27 @@ def import_mesh(document: Document, path: str | os.PathLike[str], unit: str | No
                 ) -> Document:
     """The document with the mesh of a file at its end, named after it (see :func:`core.formats.mesh_file.read_mesh`).
 
-    In a window read the file in a job and give :func:`add_mesh` what it found.
+    In a window read the file in a job and give :func:`add_mesh_file` what it found.
     """
     found = read_mesh(Path(path), unit=unit, up=up)
-    return add_mesh(document, found.mesh, found.name)
+    return add_mesh_file(document, found, os.path.abspath(path))
 
 
-def add_mesh(document: Document, mesh: Mesh, name: str, source: str = "") -> Document:
-    """The document with another mesh at its end, under a name of its own. source : the file it was read from."""
+def add_mesh(document: Document, mesh: Mesh, name: str) -> Document:
+    """The document with another mesh at its end, under a name of its own."""
     named = _free_name(name, [item.name for item in document.meshes])
-    return with_mesh(document, MeshObject(id=free_id(document.meshes), name=named, mesh=mesh, source=source))
+    return with_mesh(document, MeshObject(id=free_id(document.meshes), name=named, mesh=mesh))
+
+
+def add_mesh_file(document: Document, found: MeshFile, source: str) -> Document:
+    """The document with the mesh of a file at its end, which is remembered as its source."""
+    added = add_mesh(document, found.mesh, found.name)
+    return set_mesh_source(added, added.meshes[-1].id, source, *space_given(found))
+
+
+def space_given(found: MeshFile) -> tuple[float, str]:
+    """Metres per unit and up axis that were given when the file was read; 0 and "" where nobody gave them."""
+    return (found.metres_per_unit, found.up) if found.unit_source == "given" else (0.0, "")
 
 
 def remove_mesh(document: Document, mesh_id: int) -> Document:
@@ -155,18 +166,32 @@ def reload_mesh(
     """The document with an updated file read in place of a mesh, the hair kept. In a window read the file in a job.
 
     path : of the file, which the mesh remembers from now on; None for the one it was read from.
+    unit, up : of a file that does not say them; None for those the mesh was read with.
     """
-    source = find_mesh(document, mesh_id).source if path is None else os.path.abspath(path)
+    item = find_mesh(document, mesh_id)
+    source = item.source if path is None else os.path.abspath(path)
     if not source:
         raise UserError("It is not known which file this mesh was read from; name the file.")
-    return set_mesh_source(replace_mesh(document, mesh_id, read_mesh(Path(source), unit=unit, up=up).mesh),
-                           mesh_id, source)
+    found = read_mesh_again(item, Path(source), unit, up)
+    return set_mesh_source(replace_mesh(document, mesh_id, found.mesh), mesh_id, source, *space_given(found))
 
 
-def set_mesh_source(document: Document, mesh_id: int, source: str) -> Document:
-    """The document with another file remembered as the one a mesh is read from."""
+def read_mesh_again(
+    item: MeshObject, path: Path, unit: str | None = None, up: str | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> MeshFile:
+    """Read a file to be put in place of a mesh, in the unit and with the up axis that were given for it."""
+    return read_mesh(path, unit=unit or item.source_unit or None, up=up or item.source_up or None, cancel=cancel)
+
+
+def set_mesh_source(
+    document: Document, mesh_id: int, source: str, source_unit: float = 0.0, source_up: str = ""
+) -> Document:
+    """The document with another file remembered as the one a mesh is read from, and the space it was said to be in."""
     item = find_mesh(document, mesh_id)
-    return document if item.source == source else with_mesh(document, item.replace(source=source))
+    if (item.source, item.source_unit, item.source_up) == (source, source_unit, source_up):
+        return document
+    return with_mesh(document, item.replace(source=source, source_unit=source_unit, source_up=source_up))
 
 
 # grooms
@@ -214,7 +239,7 @@ def add_empty_groom(document: Document, mesh_id: int, name: str = "groom", point
     return add_groom(document, Groom(id=0, name=_name(name), mesh_id=mesh_id, guides=no_guides(points), coat=coat))
 
 
-def remove_plumage(document: Document, coat_id: int) -> Document:
+def remove_feathers_with_keys(document: Document, coat_id: int) -> Document:
     """The document without a coat of feathers and the groom of its keys."""
     coat = find_feathers(document, coat_id)
     without = document.replace(feathers=tuple(c for c in document.feathers if c.id != coat_id))

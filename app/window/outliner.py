@@ -33,9 +33,9 @@ from tools.document_edits import (
     add_empty_groom,
     add_groom,
     dressed,
+    remove_feathers_with_keys,
     remove_groom,
     remove_mesh,
-    remove_plumage,
     set_groom_hidden,
     set_groom_locked,
     set_mesh_hidden,
@@ -295,7 +295,7 @@ class Outliner(QTreeView):
         if isinstance(item, MeshObject):
             self._desk.edit("Delete mesh", remove_mesh, item.id)
         elif (feathers := feathers_of(self._desk.document, item)) is not None:
-            self._desk.edit("Delete feathers", remove_plumage, feathers.id)
+            self._desk.edit("Delete feathers", remove_feathers_with_keys, feathers.id)
         elif item is not None:
             self._desk.edit("Delete groom", remove_groom, item.id)
 

@@ -90,7 +90,7 @@ class MeshFile(NamedTuple):
 
 def read_mesh(
     path: str | Path,
-    unit: str | None = None,
+    unit: str | float | None = None,
     up: str | None = None,
     say: Say | None = None,
     sandboxed: bool = True,

@@ -10,6 +10,7 @@ import tools.document_edits as edits
 from core.document import Document
 from core.errors import UserError
 from core.formats.mesh_file import write_mesh
+from core.formats.project import read_project, write_project
 from core.groom.groom import Map
 from core.groom.length import lengths
 from core.mesh.mesh import Mesh
@@ -17,7 +18,7 @@ from core.mesh.surface import root_positions
 from core.record import freeze
 from core.value import constant, formula
 from tests.core.groom.small_grooms import ball
-from tests.documents import grid_mesh, small_document
+from tests.documents import feathered, grid_mesh, small_document
 from tests.tools.scenes import EVALUATOR, document, rig, session
 
 
@@ -77,6 +78,17 @@ def test_grooms_come_go_and_move():
                   lambda: edits.add_styled_groom(start, 1, "no such style")):
         with pytest.raises(UserError):
             wrong()
+
+
+def test_a_coat_of_feathers_goes_with_its_keys():
+    start = feathered(document())
+    (coat,) = start.feathers
+    assert coat.keys_id in {g.id for g in start.grooms}
+    gone = edits.remove_feathers_with_keys(start, coat.id)
+    assert gone.feathers == ()
+    assert [g.id for g in gone.grooms] == [g.id for g in start.grooms if g.id != coat.keys_id]
+    with pytest.raises(UserError, match="feathers"):
+        edits.remove_feathers_with_keys(gone, coat.id)
 
 
 def test_a_coat_takes_what_is_in_range_and_refuses_the_rest_in_words():
@@ -141,6 +153,21 @@ def test_hair_follows_a_mesh_that_moved():
     assert found.document.grooms[0].maps[0].values is start.grooms[0].maps[0].values
 
 
+def test_a_mesh_is_read_again_in_the_unit_that_was_given_for_it(tmp_path):
+    path = tmp_path / "ball.obj"
+    write_mesh(path, ball().skin.mesh)
+    start = edits.import_mesh(Document(), path, unit="cm", up="z")
+    again = edits.reload_mesh(start, start.meshes[0].id)
+    np.testing.assert_array_equal(again.meshes[0].mesh.points, start.meshes[0].mesh.points)
+    plain = edits.import_mesh(Document(), path)
+    assert np.ptp(plain.meshes[0].mesh.points) == pytest.approx(100 * np.ptp(again.meshes[0].mesh.points))
+    write_project(tmp_path / "kept.filo", again)
+    kept = read_project(tmp_path / "kept.filo").document.meshes[0]
+    assert (kept.source, kept.source_unit, kept.source_up) == (str(path), 0.01, "z")
+    inches = edits.reload_mesh(again, again.meshes[0].id, unit="in")
+    assert (inches.meshes[0].source_unit, inches.meshes[0].source_up) == (0.0254, "z")
+
+
 def test_hair_and_maps_are_kept_on_a_finer_mesh(tmp_path):
     start = document()
     fine = ball(subdivisions=4).skin.mesh
@@ -179,4 +206,4 @@ def test_all_edits_are_tested_here():
         and inspect.signature(function).return_annotation in ("Document", Document)
     }  # fmt: skip
     source = inspect.getsource(inspect.getmodule(test_all_edits_are_tested_here))
-    assert {name for name in makers if f"edits.{name}" not in source} <= {"add_mesh", "add_groom"}  # called by others
+    assert {name for name in makers if f"edits.{name}" not in source} <= {"add_mesh", "add_mesh_file", "add_groom"}

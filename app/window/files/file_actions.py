@@ -19,12 +19,12 @@ from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats import camera_file, curve_file
 from core.formats.camera_file import FileCamera, read_cameras
-from core.formats.mesh_file import MeshFile, read_mesh
+from core.formats.mesh_file import MeshFile
 from core.formats.project import write_project
 from core.gate import gate_of
 from core.navigate import whole_in
 from core.workspace import Reference
-from tools.document_edits import Replaced, replaced_mesh, set_mesh_source
+from tools.document_edits import Replaced, read_mesh_again, replaced_mesh, set_mesh_source, space_given
 from tools.macro import play
 from tools.scene import active_mesh
 
@@ -111,7 +111,7 @@ class FileActions:
         assert path is not None
 
         def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> tuple[MeshFile, Replaced]:
-            found = read_mesh(path, cancel=cancelled)
+            found = read_mesh_again(item, path, cancel=cancelled)
             progress(0.7)
             return found, replaced_mesh(document, item.id, found.mesh)
 
@@ -121,7 +121,7 @@ class FileActions:
             def put(now: Document) -> Document:
                 # the hair may have been combed meanwhile: what was made beside the window is then made anew
                 made = replaced if now is document else replaced_mesh(now, item.id, found.mesh)
-                return set_mesh_source(made.with_selection(), item.id, str(path.absolute()))
+                return set_mesh_source(made.with_selection(), item.id, str(path.absolute()), *space_given(found))
 
             if self._desk.edit("Reload mesh", put):
                 self._desk.said.emit(" ".join((reloaded(path.name, replaced), *found.notes)))

@@ -24,9 +24,8 @@ from core.formats.plate_file import is_plate
 from core.formats.project import Project, read_project
 from core.formats.rig_assembly import NoRig, RigFile
 from core.formats.rig_file import document_of, read_rig
-from core.mesh.mesh import Mesh
 from core.workspace import Reference
-from tools.document_edits import add_empty_groom, add_mesh
+from tools.document_edits import add_empty_groom, add_mesh_file
 from tools.pose_edits import add_rig, play_clip_file
 from tools.session import Session
 
@@ -221,12 +220,12 @@ class Opening(QObject):
         self._desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: read_rig(path, cancel=cancelled), done)
 
     def _open_mesh(self, path: Path, found: MeshFile) -> None:
-        document = with_mesh_to_plant(Document(), found.mesh, found.name, str(path.absolute()))
+        document = with_mesh_to_plant(Document(), found, str(path.absolute()))
         self._desk.replace_session(self._make(document, name=f"Open {path.name}"[:255]))
         self._desk.set_workspace(frame=float(document.first_frame))
 
     def _import_mesh(self, path: Path, found: MeshFile) -> None:
-        if self._desk.edit("Import mesh", with_mesh_to_plant, found.mesh, found.name, str(path.absolute())):
+        if self._desk.edit("Import mesh", with_mesh_to_plant, found, str(path.absolute())):
             document = self._desk.document
             added = document.meshes[-1].id
             self._desk.set_workspace(groom=next(g.id for g in document.grooms if g.mesh_id == added))
@@ -279,9 +278,9 @@ class Opening(QObject):
             self._desk.set_workspace(view=view.replace(references=tuple(pinned)))
 
 
-def with_mesh_to_plant(document: Document, mesh: Mesh, name: str, source: str = "") -> Document:
-    """The document with a mesh (of a file) and an empty groom on it, so that a hand can plant at once."""
-    added = add_mesh(document, mesh, name, source)
+def with_mesh_to_plant(document: Document, found: MeshFile, source: str) -> Document:
+    """The document with the mesh of a file and an empty groom on it, so that a hand can plant at once."""
+    added = add_mesh_file(document, found, source)
     return add_empty_groom(added, added.meshes[-1].id, "coat")
 
 

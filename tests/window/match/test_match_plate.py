@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QInputDialog
 
 from app.window.commands import Command
 from app.window.match import doors
@@ -98,22 +99,26 @@ def test_a_point_is_placed_followed_saved_and_opened_again(opened: Opened, plate
     assert hand.window.match.shown
 
 
-EDITS = [c for c in MATCH if c.undo is not None and not c.twin.startswith("core.match")]
+ASKS = {"match.distance"}  # a question comes before the step
+EDITS = [c for c in MATCH if c.undo is not None and not c.twin.startswith("core.match") and c.name not in ASKS]
+SELECTED = {"match.ground": (1, 2, 3)}
 BEFORE = {"match.show_all": "match.hide", "match.select_all": "match.select_none"}
 
 
 @pytest.mark.parametrize("command", EDITS, ids=lambda c: c.name)
 def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Host) -> None:
     rows = np.column_stack((np.arange(11.0, 21.0), np.random.default_rng(1).random((10, 2)) * 9.0 + 50.0))
-    tracks = tuple(keyed_track(n, f"t{n}", rows + np.array([0.0, n, n]), 1) for n in (1, 2))
+    tracks = tuple(keyed_track(n, f"t{n}", rows + np.array([0.0, n, n]), 1) for n in (1, 2, 3))
     film = Plate(id=1, name="p", path="nothing.####.png", first=11, last=20, width=200, height=100)
     document = edits.put_tracks(edits.add_plate(host.desk.document, film), tracks)
     shape = freeze(np.array([[[5.0, 5.0], [50.0, 5.0], [5.0, 50.0]]]))
     mask = Mask(id=1, name="m", frames=freeze(np.array([11], np.int32)), points=shape, plate_id=1)
-    solved = small_solve().replace(size=(200, 100), track_ids=freeze(np.array([2], np.int32)), cubes=())
+    solved = small_solve().replace(
+        size=(200, 100), track_ids=freeze(np.arange(1, 4, dtype=np.int32)), cubes=(), errors=freeze(np.full(3, 0.2)),
+        points=freeze(np.array([[0.0, 0.0, 5.0], [0.0, 1.0, 5.0], [1.0, 0.5, 6.0]])))
     document = document.replace(
         masks=(mask,), plates=(*document.plates, film.replace(id=2, hidden=True)), solves=(solved,))
-    host.desk.session.commit("Tracks", edits.select_tracks(document, (1, 2)))
+    host.desk.session.commit("Tracks", edits.select_tracks(document, SELECTED.get(command.name, (1, 2))))
     host.desk.set_workspace(frame=15.0)
     if command.name in BEFORE:
         assert host.commands.run(BEFORE[command.name]), host.failed
@@ -123,6 +128,27 @@ def test_the_step_of_an_edit_has_the_name_it_promises(command: Command, host: Ho
     assert host.desk.session.history.undo_name == command.undo
     host.commands.run("edit.undo")
     assert host.desk.document is before
+
+
+def test_the_distance_between_two_tracks_is_asked_for_in_metres(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    desk = hand.window.desk
+    shot = desk.document.plates[0]
+    tracks = tuple(keyed_track(n, f"t{n}", np.array([[FIRST, 50.0 + n, 60.0]]), shot.id) for n in (1, 2))
+    solved = small_solve().replace(
+        plate_id=shot.id, size=(WIDTH, HEIGHT), track_ids=freeze(np.array([1, 2], np.int32)), cubes=(),
+        points=freeze(np.array([[0.0, 0.0, 5.0], [0.0, 3.0, 9.0]])), errors=freeze(np.full(2, 0.2)))
+    ready = edits.put_tracks(desk.document, tracks).replace(solves=(solved,))
+    desk.session.commit("Tracks", edits.select_tracks(ready, (1, 2)))
+    for words, apart in (("far", 5.0), ("2,5", 2.5)):
+        assert hand.window.commands.run("match.distance")
+        (dialog,) = hand.window.findChildren(QInputDialog)
+        dialog.setTextValue(words)
+        dialog.accept()
+        hand.until(lambda: not hand.window.findChildren(QInputDialog))
+        first, second = desk.document.solves[0].points
+        assert np.linalg.norm(second - first) == pytest.approx(apart), words
+    assert desk.session.history.undo_name == "Set distance"
 
 
 def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:
