@@ -6,6 +6,15 @@ import numpy as np
 
 from core.match.solved import LineUp, SolvedCamera, frozen
 
+LOST = (
+    "Too few tracks are those of the solve before: the world begins anew and is no longer lined up. Say again where it "
+    "lies."
+)
+LET_GO = (
+    "A track that says where the world lies has no place in this solve: the world stays about where it was. Say it "
+    "again."
+)
+
 
 def lined_up(solved: SolvedCamera, line_up: LineUp) -> SolvedCamera:
     """The solve in the world that is said: a similarity, which moves no point in the picture.
@@ -37,16 +46,26 @@ def lined_up(solved: SolvedCamera, line_up: LineUp) -> SolvedCamera:
 
 
 def as_before(solved: SolvedCamera, before: SolvedCamera) -> SolvedCamera:
-    """A new solve laid onto the points it shares with the one before, and lined up as that was."""
+    """A new solve laid onto the points it shares with the one before, and lined up as that was.
+
+    Where that cannot be, wholly or in part, a warning says so.
+    """
     from core.errors import UserError
     from core.match.solve.coordinates import onto
 
     _, ours, theirs = np.intersect1d(solved.track_ids, before.track_ids, return_indices=True)
     try:
         scale, turn, shift = onto(solved.points[ours], before.points[theirs])
-        return lined_up(_moved(solved, scale, turn, shift), before.line_up)
+        placed = lined_up(_moved(solved, scale, turn, shift), before.line_up)
     except UserError:  # too little is shared, or the ground is no plane any more: the world begins anew
-        return solved
+        return _warned(solved, LOST) if before.line_up.said else solved
+    missing = set(before.line_up.tracks) - {int(track) for track in solved.track_ids}
+    return _warned(placed, LET_GO) if missing else placed
+
+
+def _warned(solved: SolvedCamera, words: str) -> SolvedCamera:
+    warned: SolvedCamera = solved.replace(warnings=(*solved.warnings, words))
+    return warned
 
 
 def _moved(solved: SolvedCamera, scale: float, turn: np.ndarray, shift: np.ndarray) -> SolvedCamera:

@@ -79,7 +79,13 @@ class LineUp(Record):
     @property
     def said(self) -> bool:
         """Whether anything is said."""
-        return bool(self.origin or self.axis or self.ground or self.distance)
+        return bool(self.tracks)
+
+    @property
+    def tracks(self) -> tuple[int, ...]:
+        """Ids of the tracks that say it."""
+        origin = (self.origin,) if self.origin else ()
+        return (*origin, *self.axis, *self.ground, *self.distance)
 
 
 class SolvedCamera(Record):
