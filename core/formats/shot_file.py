@@ -1,4 +1,5 @@
-"""Every file of a solved camera: one table of doors by suffix; COLMAP's model is named by its file of cameras."""
+"""Every file of a solved camera: one table of doors by suffix; COLMAP's model is named by its file of cameras,
+that of OpenSfM reconstruction.json."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from core.errors import UserError
-from core.formats import alembic_solve, shot_models, shot_text, usd_solve
+from core.formats import alembic_solve, shot_models, shot_sfm, shot_text, usd_solve
 from core.formats.atomic import atomic_write
 from core.formats.lens_file import lens_text
 from core.match.solve.shot import Shot
@@ -16,14 +17,18 @@ COLMAP = ("cameras.txt", "cameras.bin")
 TEXTS: dict[str, Callable[[Shot], str]] = {
     ".nk": shot_text.nuke_text, ".chan": shot_text.chan_text, ".ma": shot_text.maya_text,
     ".py": shot_text.blender_text, ".txt": lambda shot: lens_text(shot.lens, shot.size),
+    ".out": shot_sfm.bundler_text, ".json": shot_sfm.opensfm_text,
 }  # fmt: skip
-WRITTEN = (*usd_solve.SUFFIXES, alembic_solve.SUFFIX, *TEXTS, *COLMAP)
+WRITTEN = (
+    *usd_solve.SUFFIXES, alembic_solve.SUFFIX, *(suffix for suffix in TEXTS if suffix != ".json"), *COLMAP,
+    shot_sfm.OPENSFM,
+)
 READ = (*usd_solve.SUFFIXES, alembic_solve.SUFFIX, ".nk", ".chan", ".out", ".json", *COLMAP)
 
 
 def check_writable(path: Path) -> None:
     """Refuse a name no shot is written as."""
-    if path.name.lower() not in COLMAP and path.suffix.lower() not in WRITTEN:
+    if path.name.lower() not in WRITTEN and path.suffix.lower() not in WRITTEN:
         raise UserError(f"{path.name}: a camera is written as {', '.join(WRITTEN)}; choose one of these")
 
 
@@ -64,8 +69,8 @@ def read_shot(path: Path, size: tuple[int, int] | None) -> Shot:
     if path.stat().st_size > shot_models.LARGEST:
         raise UserError(f"{path.name} is larger than {shot_models.LARGEST >> 30} GB.")
     if suffix == ".json":
-        return shot_models.read_opensfm(path.read_bytes(), path.name)
-    readers = {".nk": shot_text.read_nuke, ".chan": shot_text.read_chan, ".out": shot_models.read_bundler}
+        return shot_sfm.read_opensfm(path.read_bytes(), path.name)
+    readers = {".nk": shot_text.read_nuke, ".chan": shot_text.read_chan, ".out": shot_sfm.read_bundler}
     if suffix not in readers:
         raise UserError(f"{path.name} is no file of a camera path; there are {', '.join(READ)}.")
     if size is None:

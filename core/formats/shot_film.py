@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 def film_of(shot: Shot) -> Array:
     """(F, 5) focal length, aperture across and down, offset to the right and up of every frame."""
     width, height = shot.size
-    pixel, lens = FILM / width, shot.lens
+    pixel = FILM / width
+    right, below = shot.off_centre
     film = np.empty((len(shot.frames), 5))
     film[:, 0] = shot.focal * pixel
-    film[:, 1:] = (FILM, FILM * height / width / shot.stretch, -(lens[CENTRE_X] - 0.5 * (width - 1)) * pixel,
-                   (lens[CENTRE_Y] - 0.5 * (height - 1)) * pixel / shot.stretch)
+    film[:, 1:] = FILM, FILM * height / width / shot.stretch, -right * pixel, below * pixel / shot.stretch
     return film
 
 

@@ -1,8 +1,6 @@
-"""Cameras and points of reconstructions: COLMAP (text and binary, both ways), Bundler and OpenSfM (read).
+"""Cameras, points and who saw them as COLMAP has them: cameras, images and points3D, `.txt` or `.bin`.
 
-COLMAP: cameras, images and points3D, `.txt` or `.bin`; the name of its file of cameras stands for the three. Its pixels
-begin at the corner, ours at the centre. Bundler: ``bundle.out``, y up, looking along -z. OpenSfM:
-``reconstruction.json``, coordinates over the longer side of the picture.
+The name of its file of cameras stands for the three. Its pixels begin at the corner, ours at the centre.
 """
 
 from __future__ import annotations
@@ -12,14 +10,13 @@ import struct
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.match.lens import model_of, start_lens
-from core.match.solve.shot import FLIP, Shot
+from core.match.solve.shot import Shot
 from core.match.solve.state import Array
 
 LARGEST = 1 << 30
@@ -47,35 +44,59 @@ def write_colmap(path: Path, shot: Shot) -> None:
     cameras = [(k + 1, [f, f * stretch, *rest]) for k, f in enumerate(shot.focal if shot.zooms else shot.focal[:1])]
     turns = Rotation.from_matrix(shot.rotation).as_quat()[:, [3, 0, 1, 2]]
     images = [
-        (k + 1, [*turns[k], *shot.translation[k]], k + 1 if shot.zooms else 1, f"frame.{frame:04d}.png")
+        (k + 1, [*turns[k], *shot.translation[k]], k + 1 if shot.zooms else 1, picture_name(frame))
         for k, frame in enumerate(shot.frames)
     ]
+    sights = _Sights(shot)
     binary = path.suffix.lower() == ".bin"
-    parts = (_binary if binary else _text)(MODELS[model][0], model, shot, cameras, images)
+    parts = (_binary if binary else _text)(MODELS[model][0], model, shot, cameras, images, sights)
     for part, data in zip(("cameras", "images", "points3D"), parts, strict=True):
         with atomic_write(path.with_name(part + path.suffix)) as beside:
             beside.write_bytes(data)
 
 
-def _text(number: int, model: str, shot: Shot, cameras: list[Any], images: list[Any]) -> tuple[bytes, ...]:
+class _Sights:
+    """Who saw what, numbered as COLMAP does: the places of an image in the order of their points."""
+
+    def __init__(self, shot: Shot) -> None:
+        self.of_image: list[list[tuple[float, float, int]]] = [[] for _ in shot.frames]
+        self.of_point: list[list[int]] = [[] for _ in shot.points]
+        if shot.seen is not None:
+            for frame, point, (x, y) in zip(*(part.tolist() for part in shot.seen), strict=True):
+                self.of_point[point] += [frame + 1, len(self.of_image[frame])]
+                self.of_image[frame].append((x + 0.5, y + 0.5, point + 1))
+
+
+def _text(
+    number: int, model: str, shot: Shot, cameras: list[Any], images: list[Any], sights: _Sights
+) -> tuple[bytes, ...]:
     def words(numbers: Any) -> str:
         return " ".join(f"{float(v):.15g}" for v in numbers)
 
     width, height = shot.size
     first = "".join(f"{key} {model} {width} {height} {words(values)}\n" for key, values in cameras)
-    second = "".join(f"{key} {words(pose)} {camera} {name}\n\n" for key, pose, camera, name in images)
-    third = "".join(f"{k + 1} {words(place)} 128 128 128 0\n" for k, place in enumerate(shot.points))
+    second = "".join(
+        f"{key} {words(pose)} {camera} {name}\n" + " ".join(f"{x:.9g} {y:.9g} {point}" for x, y, point in seen) + "\n"
+        for (key, pose, camera, name), seen in zip(images, sights.of_image, strict=True))
+    third = "".join(
+        f"{k + 1} {words(place)} 128 128 128 0 {' '.join(map(str, seen))}\n"
+        for k, (place, seen) in enumerate(zip(shot.points, sights.of_point, strict=True)))
     return tuple(part.encode() for part in (first, second, third))
 
 
-def _binary(number: int, model: str, shot: Shot, cameras: list[Any], images: list[Any]) -> tuple[bytes, ...]:
+def _binary(
+    number: int, model: str, shot: Shot, cameras: list[Any], images: list[Any], sights: _Sights
+) -> tuple[bytes, ...]:
     first = struct.pack("<Q", len(cameras)) + b"".join(
         struct.pack(f"<IiQQ{len(values)}d", key, number, *shot.size, *values) for key, values in cameras)
     second = struct.pack("<Q", len(images)) + b"".join(
-        struct.pack("<I7dI", key, *pose, camera) + name.encode() + b"\0" + struct.pack("<Q", 0)
-        for key, pose, camera, name in images)
+        struct.pack("<I7dI", key, *pose, camera) + name.encode() + b"\0" + struct.pack("<Q", len(seen))
+        + b"".join(struct.pack("<2dQ", *one) for one in seen)
+        for (key, pose, camera, name), seen in zip(images, sights.of_image, strict=True))
     third = struct.pack("<Q", len(shot.points)) + b"".join(
-        struct.pack("<Q3d3BdQ", k + 1, *place, 128, 128, 128, 0.0, 0) for k, place in enumerate(shot.points))
+        struct.pack("<Q3d3BdQ", k + 1, *place, 128, 128, 128, 0.0, len(seen) // 2)
+        + struct.pack(f"<{len(seen)}I", *seen)
+        for k, (place, seen) in enumerate(zip(shot.points, sights.of_point, strict=True)))
     return first, second, third
 
 
@@ -104,8 +125,8 @@ def read_colmap(path: Path) -> Shot:
         found = []
         for k, (pose, camera, name) in enumerate(images):
             turn = Rotation.from_quat(np.array(pose)[[1, 2, 3, 0]]).as_matrix()
-            found.append((_frame_of(name, k), turn, np.array(pose[4:]), lenses[camera], cameras[camera][1]))
-        return _shot(found, points, path.name)
+            found.append((frame_of(name, k), turn, np.array(pose[4:]), lenses[camera], cameras[camera][1]))
+        return shot_of_images(found, points, path.name)
     except (struct.error, ValueError, KeyError, IndexError, OverflowError, UnicodeDecodeError):
         raise UserError(f"{path.name}: COLMAP's model is cut or damaged.") from None
 
@@ -184,12 +205,17 @@ def _lens(model: str, size: tuple[int, int], values: list[float]) -> Array:
     return lens
 
 
-def _frame_of(name: str, row: int) -> int:
+def picture_name(frame: int) -> str:
+    """What a frame of the plate is called where only pictures are known."""
+    return f"frame.{frame:04d}.png"
+
+
+def frame_of(name: str, row: int) -> int:
     numbers = re.findall(r"\d+", Path(name).stem)
     return int(numbers[-1]) if numbers and len(numbers[-1]) < 9 else row + 1
 
 
-def _shot(images: list[tuple[int, Array, Array, Array, tuple[int, int]]], points: Array, name: str) -> Shot:
+def shot_of_images(images: list[tuple[int, Array, Array, Array, tuple[int, int]]], points: Array, name: str) -> Shot:
     """A shot of (frame, rotation, translation, lens, size), which must share their lens but for the focal length."""
     if not images:
         raise UserError(f"{name} holds no cameras.")
@@ -209,59 +235,3 @@ def _shot(images: list[tuple[int, Array, Array, Array, tuple[int, int]]], points
         np.exp(np.array([image[3][0] for image in images])), lens, points,
         tuple(f"point{k + 1}" for k in range(len(points))),
     )
-
-
-def read_bundler(text: str, size: tuple[int, int], name: str) -> Shot:
-    """Cameras of a ``bundle.out`` that were found (a focal length above 0), and its points."""
-    try:
-        numbers = [line for line in text.splitlines() if not line.startswith("#")]
-        words = iter(" ".join(numbers).split())
-        count, many = int(next(words)), int(next(words))
-        if not (0 <= count < 1_000_000 and 0 <= many < 50_000_000):
-            raise ValueError
-        images = []
-        for k in range(count):
-            values = np.array([float(next(words)) for _ in range(15)])
-            if values[0] > 0.0:
-                lens = start_lens(float(values[0]), *size)
-                lens[1:3] = values[1:3]
-                images.append((k + 1, FLIP @ values[3:12].reshape(3, 3), FLIP @ values[12:15], lens, size))
-        points = np.zeros((many, 3))
-        for k in range(many):
-            points[k] = [float(next(words)) for _ in range(3)]
-            for _ in range(3):
-                next(words)
-            for _ in range(4 * int(next(words))):
-                next(words)
-    except (StopIteration, ValueError, RuntimeError):
-        raise UserError(f"{name} is no bundle of Bundler, or it is cut.") from None
-    return _shot(images, points, name)
-
-
-def read_opensfm(data: bytes, name: str) -> Shot:
-    """The first reconstruction of OpenSfM."""
-    try:
-        found = msgspec.json.decode(data)[0]
-        images = []
-        for k, (image, shot) in enumerate(found["shots"].items()):
-            camera = found["cameras"][shot["camera"]]
-            kind = camera["projection_type"]
-            if kind not in ("perspective", "brown", "fisheye_opencv", "perspective_opencv"):
-                raise UserError(f"{name}: cameras of the kind {str(kind)[:40]} are not read.")
-            if any(camera.get(key, 0.0) for key in ("p1", "p2", "k3", "k4")) and kind != "fisheye_opencv":
-                raise UserError(f"{name}: a lens has a tangential or a third part, which is not read.")
-            size = (int(camera["width"]), int(camera["height"]))
-            long = float(max(size))
-            focal = float(camera["focal"] if "focal" in camera else camera["focal_x"])
-            lens = start_lens(focal * long, *size, "fisheye" if kind == "fisheye_opencv" else "brown")
-            lens[3] = np.log(float(camera.get("focal_y", focal)) / focal)
-            lens[4:6] += long * np.array([camera.get("c_x", 0.0), camera.get("c_y", 0.0)])
-            lens[1:3] = camera.get("k1", 0.0), camera.get("k2", 0.0)
-            if kind == "fisheye_opencv":
-                lens[6:8] = camera.get("k3", 0.0), camera.get("k4", 0.0)
-            turn = Rotation.from_rotvec(np.array(shot["rotation"], np.float64)).as_matrix()
-            images.append((_frame_of(image, k), turn, np.array(shot["translation"], np.float64), lens, size))
-        points = np.array([point["coordinates"] for point in found["points"].values()], np.float64).reshape(-1, 3)
-    except (msgspec.DecodeError, KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError):
-        raise UserError(f"{name} is no reconstruction of OpenSfM.") from None
-    return _shot(images, points, name)

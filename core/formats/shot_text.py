@@ -13,38 +13,55 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
+from core.formats.shot_film import FILM, film_of, shot_of_film
 from core.formats.tracks_text import nuke_curve
 from core.match.solve.shot import Shot, shot_from_up
-from core.match.solve.state import CENTRE_X, CENTRE_Y, Array
+from core.match.solve.state import Array
 
-FILM = 36.0  # millimetres across
 INCH = 25.4
 MOST = 1_000_000
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 def nuke_text(shot: Shot) -> str:
-    """A Camera node with curves; the picture it takes is the straight one."""
+    """A Camera node with curves; the picture it takes is the straight one.
+
+    The window is moved in halves of the aperture across, both ways, as the projection of Nuke's camera has it.
+    """
     moves, turns = _moves(shot, "YXZ")
-    width = shot.size[0]
+    film = film_of(shot)
+    window = film[0, 3:5] / (0.5 * FILM)
 
     def curve(values: Array) -> str:
         return "{curve " + " ".join(f"x{f} {v:.12g}" for f, v in zip(shot.frames, values, strict=True)) + "}"
 
-    focal = curve(shot.focal * FILM / width) if shot.zooms else f"{shot.focal[0] * FILM / width:.12g}"
+    focal = curve(film[:, 0]) if shot.zooms else f"{film[0, 0]:.12g}"
     return (
         "Camera2 {\n rot_order ZXY\n"
         f" translate {{{' '.join(curve(column) for column in moves.T)}}}\n"
         f" rotate {{{' '.join(curve(column) for column in turns.T)}}}\n"
-        f" focal {{{focal}}}\n haperture {FILM:.12g}\n vaperture {_tall(shot):.12g}\n"
+        f" focal {{{focal}}}\n haperture {FILM:.12g}\n vaperture {film[0, 2]:.12g}\n"
+        f" win_translate {{{window[0]:.12g} {window[1]:.12g}}}\n"
         " name FiloplumeCamera\n}\n"
     )
 
 
 def chan_text(shot: Shot) -> str:
-    """Lines of frame, place, rotation in degrees, vertical field of view in degrees."""
+    """Lines of frame, place, rotation in degrees, vertical field of view in degrees.
+
+    Raises
+    ------
+    UserError
+        The centre of the lens is not that of the picture, of which such a file knows nothing.
+    """
+    off = max(map(abs, shot.off_centre))
+    if off > 0.01:
+        raise UserError(
+            f"The centre of the lens lies {off:.1f} px off that of the picture, which .chan cannot say; write .nk "
+            "instead.")
     moves, turns = _moves(shot, "YXZ")
-    view = np.degrees(2.0 * np.arctan2(0.5 * _tall(shot), shot.focal * FILM / shot.size[0]))
+    film = film_of(shot)
+    view = np.degrees(2.0 * np.arctan2(0.5 * film[:, 2], film[:, 0]))
     rows = np.column_stack([moves, turns, view])
     lines = (f"{f}\t" + "\t".join(f"{v:.12g}" for v in row) for f, row in zip(shot.frames, rows, strict=True))
     return "\n".join(lines) + "\n"
@@ -54,19 +71,20 @@ def maya_text(shot: Shot) -> str:
     """A camera with curves, and a locator for every point; one unit of the solve is one of Maya's."""
     moves, turns = _moves(shot, "ZYX")
     turns = turns[:, ::-1]  # x, y, z; the first is done first
-    width = shot.size[0]
+    film = film_of(shot)
     channels = [(f"t{axis}", "animCurveTL", moves[:, k]) for k, axis in enumerate("xyz")]
     channels += [(f"r{axis}", "animCurveTA", turns[:, k]) for k, axis in enumerate("xyz")]
     lines = [
         "//Maya ASCII 2018 scene", 'requires maya "2018";', "currentUnit -l centimeter -a degree -t film;",
         'createNode transform -n "filoplume_camera";', '\tsetAttr ".ro" 0;',
         'createNode camera -n "filoplume_cameraShape" -p "filoplume_camera";', '\tsetAttr -k off ".v";',
-        f'\tsetAttr ".cap" -type "double2" {FILM / INCH:.12g} {_tall(shot) / INCH:.12g} ;',
+        f'\tsetAttr ".cap" -type "double2" {FILM / INCH:.12g} {film[0, 2] / INCH:.12g} ;',
+        f'\tsetAttr ".hfo" {film[0, 3] / INCH:.12g};', f'\tsetAttr ".vfo" {film[0, 4] / INCH:.12g};',
         '\tsetAttr ".ff" 1;',  # fit the width
-        f'\tsetAttr ".fl" {shot.focal[0] * FILM / width:.12g};',
+        f'\tsetAttr ".fl" {film[0, 0]:.12g};',
     ]
     if shot.zooms:
-        channels.append(("fl", "animCurveTU", shot.focal * FILM / width))
+        channels.append(("fl", "animCurveTU", film[:, 0]))
     links = []
     for name, kind, values in channels:
         keys = " ".join(f"{f} {v:.12g}" for f, v in zip(shot.frames, values, strict=True))
@@ -89,12 +107,11 @@ def blender_text(shot: Shot) -> str:
     turn = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # Blender is z up
     poses = turn @ matrices
     width, height = shot.size
-    lens = shot.lens
-    x, y = (lens[CENTRE_X] - 0.5 * (width - 1)) / width, (lens[CENTRE_Y] - 0.5 * (height - 1)) / width
-    shift = (-float(x), float(y / shot.stretch))
+    film = film_of(shot)
+    shift = (float(film[0, 3] / FILM), float(film[0, 4] / FILM))
     data = json.dumps({
         "frames": shot.frames.tolist(), "poses": poses.reshape(-1, 16).round(12).tolist(),
-        "focal": (shot.focal * FILM / width).tolist(), "points": (places @ turn[:3, :3].T).round(9).tolist(),
+        "focal": film[:, 0].tolist(), "points": (places @ turn[:3, :3].T).round(9).tolist(),
         "names": list(shot.names),
     })
     return f'''"""A solved camera of Filoplume: open in Blender's text editor and run it."""
@@ -162,12 +179,18 @@ def read_nuke(text: str, size: tuple[int, int], name: str) -> Shot:
     focal = curves("focal", 1, 50.0)[0]
     frames = np.array(sorted({f for part in (*moves, *turns) for f in part if len(part) > 1}) or [1])
     across = next(iter(curves("haperture", 1, 24.576)[0].values()))
+    if not 0.0 < across < MOST:
+        raise UserError(f"{name}: the camera has no aperture.")
+    window = [next(iter(keys.values())) for keys in curves("win_translate", 2, 0.0)]
 
     def at(keys: dict[float, float]) -> Array:
         return np.asarray(np.interp(frames, sorted(keys), [keys[f] for f in sorted(keys)]))
 
     matrix = _matrices(np.column_stack([at(k) for k in moves]), np.column_stack([at(k) for k in turns]))
-    return shot_from_up(size, frames.astype(np.int32), matrix, at(focal) / across * size[0], np.zeros((0, 3)))
+    tall = across * size[1] / size[0]  # Nuke's pictures are as wide as the aperture; the format says how high
+    film = np.column_stack([at(focal), *(np.full(len(frames), v) for v in (
+        across, tall, 0.5 * across * window[0], 0.5 * across * window[1]))])
+    return shot_of_film(size, frames.astype(np.int32), matrix, film, np.zeros((0, 3)), (), "y")
 
 
 def read_chan(text: str, size: tuple[int, int], name: str) -> Shot:
@@ -193,24 +216,9 @@ def _matrices(moves: Array, turns: Array) -> Array:
 
 
 def _moves(shot: Shot, order: str) -> tuple[Array, Array]:
-    """Places (F, 3), and rotations (F, 3) in degrees without jumps: x, y, z of YXZ, else as `order` names them.
-
-    Raises
-    ------
-    UserError
-        The centre of the lens is not that of the picture, which these programs each take otherwise.
-    """
-    off = np.abs(shot.lens[[CENTRE_X, CENTRE_Y]] - 0.5 * (np.array(shot.size) - 1)).max()
-    if off > 0.01:
-        raise UserError(
-            f"The centre of the lens lies {off:.1f} px off that of the picture, which this format does not say "
-            "safely; write .usda or .py instead."
-        )
+    """Places (F, 3), and rotations (F, 3) in degrees without jumps: x, y, z of YXZ, else as `order` names them."""
     matrices, _ = shot.up()
     turns = Rotation.from_matrix(matrices[:, :3, :3]).as_euler(order)
     turns = np.degrees(np.unwrap(turns, axis=0))
     return matrices[:, :3, 3], turns[:, [1, 0, 2]] if order == "YXZ" else turns
 
-
-def _tall(shot: Shot) -> float:
-    return FILM * shot.size[1] / shot.size[0] / shot.stretch

@@ -5,12 +5,31 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.match.lens import bent, start_lens
 from core.match.solve.solve import Solution
-from core.match.solve.state import ASPECT, FOCAL, Array, Rows
+from core.match.solve.state import ASPECT, CENTRE_X, CENTRE_Y, FOCAL, Array, Rows
+from core.mesh.mesh import Mesh
 
 FLIP = np.diag([1.0, -1.0, -1.0])  # y down, z ahead <-> y up, z back
+
+
+class Seen(NamedTuple):
+    """Where points were seen: frame (N,) and point (N,) int32 rows of a shot, xy (N, 2) pixels of the plate."""
+
+    frame: Rows
+    point: Rows
+    xy: Array
+
+
+class Thing(NamedTuple):
+    """What moved by itself: its mesh, frames (F,) int32 rising, world (F, 4, 4) world_from_object, y up."""
+
+    name: str
+    mesh: Mesh
+    frames: Rows
+    world: Array
 
 
 class Shot(NamedTuple):
@@ -19,6 +38,7 @@ class Shot(NamedTuple):
     size : pixels of the plate. frames (F,) their numbers, rising. rotation (F, 3, 3) camera_from_world, translation
     (F, 3). focal (F,) pixels across. lens (L,) of `core/match/lens.py`; its focal length is that of the first frame.
     points (P, 3) in world, names of them. The world is y down as well; programs get it y up.
+    seen : where the points were seen, where that is known. things : what moved by itself.
     """
 
     size: tuple[int, int]
@@ -29,6 +49,8 @@ class Shot(NamedTuple):
     lens: Array
     points: Array
     names: tuple[str, ...]
+    seen: Seen | None = None
+    things: tuple[Thing, ...] = ()
 
     def centres(self) -> Array:
         """(F, 3) where the cameras stand."""
@@ -38,6 +60,12 @@ class Shot(NamedTuple):
     def zooms(self) -> bool:
         """Whether the focal length changes."""
         return bool(np.ptp(self.focal) > 1e-9 * float(self.focal[0]))
+
+    @property
+    def off_centre(self) -> tuple[float, float]:
+        """Pixels the centre of the lens lies right of and below that of the picture."""
+        width, height = self.size
+        return float(self.lens[CENTRE_X] - 0.5 * (width - 1)), float(self.lens[CENTRE_Y] - 0.5 * (height - 1))
 
     @property
     def stretch(self) -> float:
@@ -67,8 +95,18 @@ def shot_of(solution: Solution, names: list[str]) -> Shot:
     lens[FOCAL] = np.log(focal[0]) if len(known) else lens[FOCAL]
     return Shot(
         solution.size, solution.frames[known], state.rotation[known], state.translation[known], focal, lens,
-        state.points[held], tuple(names[k] for k in held),
+        state.points[held], tuple(names[k] for k in held), _seen(solution, known, held),
     )
+
+
+def _seen(solution: Solution, known: NDArray[np.intp], held: NDArray[np.intp]) -> Seen:
+    """The observations that were used, of frames `known` and points `held`."""
+    frame, point = np.full(len(solution.known), -1, np.int32), np.full(len(solution.held), -1, np.int32)
+    frame[known], point[held] = np.arange(len(known)), np.arange(len(held))
+    part = solution.observations.take(solution.used & (frame[solution.observations.frame] >= 0))
+    middle = solution.state.lens[[CENTRE_X, CENTRE_Y]]
+    return Seen(
+        frame[part.frame], point[part.track], middle + (part.xy - middle) * solution.pixel[part.frame, None])
 
 
 def shot_from_up(

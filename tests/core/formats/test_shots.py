@@ -9,9 +9,9 @@ from pxr import Usd
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
-from core.formats.shot_file import read_shot, write_shot
+from core.formats.shot_file import check_writable, read_shot, write_shot
 from core.match.lens import start_lens
-from core.match.solve.shot import Shot
+from core.match.solve.shot import Seen, Shot
 
 SIZE = (1920, 1080)
 
@@ -76,8 +76,33 @@ def test_alembic_has_the_straight_camera_its_offsets_and_the_names_of_tracks(gap
 @pytest.mark.parametrize("name", ["a.nk", "a.chan"])
 def test_nuke_has_the_straight_camera(name, tmp_path):
     made = _shot(zoom=True, bent=False)
+    if name == "a.nk":
+        made.lens[4:6] += 31.0, -17.0
     write_shot(tmp_path / name, made, {})
     _same_pictures(made, read_shot(tmp_path / name, SIZE))
+
+
+def test_nukes_window_and_mayas_film_are_moved_as_their_projections_have_it(tmp_path):
+    """Nuke: x over -z times twice the focal length over the aperture, less the window, is -1 to 1 across. Maya: a film
+    moved to the right sees what lies right of the axis in its middle."""
+    made = _shot(bent=False)
+    made.lens[4:6] += 31.0, -17.0
+    place = made.up()[1][3]
+    seen = np.append(place, 1.0) @ np.linalg.inv(made.up()[0][4]).T
+    flat = seen[:2] / -seen[2]
+    write_shot(tmp_path / "a.nk", made, {})
+    knob = {name: np.array(words.strip("{}").split(), float) for name, words in re.findall(
+        r"^ (focal|haperture|win_translate) (.*)$", (tmp_path / "a.nk").read_text(), re.M)}
+    unit = 2.0 * knob["focal"] / knob["haperture"] * flat - knob["win_translate"]
+    pixel = np.array([0.5 * SIZE[0] * (1.0 + unit[0]), 0.5 * SIZE[1] - 0.5 * SIZE[0] * unit[1]]) - 0.5
+    np.testing.assert_allclose(pixel, made.pixels(4, made.points[3:4])[0], atol=1e-3)
+    write_shot(tmp_path / "a.ma", made, {})
+    inches = {name: float(value) for name, value in re.findall(
+        r'setAttr "\.(hfo|vfo|fl)" (\S+);', (tmp_path / "a.ma").read_text())}
+    on_film = inches["fl"] / 25.4 * flat - [inches["hfo"], inches["vfo"]]
+    inch = float(re.search(r'"\.cap" -type "double2" (\S+)', (tmp_path / "a.ma").read_text())[1]) / SIZE[0]
+    middle = 0.5 * (np.array(SIZE) - 1.0)
+    np.testing.assert_allclose(on_film / inch * [1, -1] + middle, made.pixels(4, made.points[3:4])[0], atol=1e-3)
 
 
 def test_nuke_turns_in_the_order_it_says(tmp_path):
@@ -114,7 +139,7 @@ def test_a_camera_off_its_centre_is_refused_where_it_cannot_be_said(tmp_path):
     made = _shot()
     made.lens[4] += 3.0
     with pytest.raises(UserError, match=r"3\.0 px off"):
-        write_shot(tmp_path / "a.nk", made, {})
+        write_shot(tmp_path / "a.chan", made, {})
 
 
 def test_a_stage_of_another_program_is_read(tmp_path):
@@ -140,6 +165,56 @@ def test_bundler_is_read(tmp_path):
     back = read_shot(tmp_path / "bundle.out", SIZE)
     _same_pictures(made._replace(frames=back.frames), back)
     np.testing.assert_allclose(back.points, made.points)
+
+
+def _all_seen(made: Shot) -> Shot:
+    """With every place in the picture, to a hundredth of a pixel."""
+    rows = []
+    for frame in range(len(made.frames)):
+        ahead = (made.points @ made.rotation[frame].T + made.translation[frame])[:, 2] > 1.0
+        xy = made.pixels(frame, made.points)
+        rows += [(frame, k, *np.round(xy[k], 2)) for k in np.flatnonzero(ahead)]
+    table = np.array(rows)
+    return made._replace(seen=Seen(table[:, 0].astype(np.int32), table[:, 1].astype(np.int32), table[:, 2:]))
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".bin"])
+def test_colmap_has_who_saw_what(suffix, tmp_path):
+    made = _all_seen(_shot())
+    write_shot(tmp_path / f"cameras{suffix}", made, {})
+    _same_pictures(made, read_shot(tmp_path / f"cameras{suffix}", None))
+    if suffix == ".bin":
+        return
+    images = (tmp_path / "images.txt").read_text().splitlines()
+    points = (tmp_path / "points3D.txt").read_text().splitlines()
+    seen = np.array(images[2 * 4 + 1].split(), float).reshape(-1, 3)
+    rows = seen[:, 2].astype(int) - 1
+    np.testing.assert_allclose(seen[:, :2] - 0.5, made.pixels(4, made.points[rows]), atol=0.006)
+    for row in rows:  # the point names the picture, and its place there
+        back = np.array(points[row].split()[8:], int).reshape(-1, 2)
+        place = dict(back.tolist())[5]
+        assert int(seen[place, 2]) == row + 1
+
+
+def test_bundler_and_opensfm_are_written(tmp_path):
+    made = _all_seen(_shot(zoom=True))
+    write_shot(tmp_path / "bundle.out", made, {})
+    back = read_shot(tmp_path / "bundle.out", SIZE)
+    _same_pictures(made._replace(frames=back.frames), back)
+    views = (tmp_path / "bundle.out").read_text().splitlines()[2 + 5 * 12 + 2 :: 3]
+    frame, point, x, y = views[7].split()[1:5]
+    at = made.pixels(int(frame), made.points[7:8])[0]
+    assert point == "7"
+    np.testing.assert_allclose([float(x) + 959.5, 539.5 - float(y)], at, atol=0.006)
+    with pytest.raises(UserError, match="Bundler has only"):
+        write_shot(tmp_path / "b.out", _shot("fisheye"), {})
+    for model in ("brown", "fisheye"):
+        made = _shot(model, zoom=model == "brown")
+        made.lens[3:6] += 0.1, 11.0, -5.0
+        write_shot(tmp_path / "reconstruction.json", made, {})
+        _same_pictures(made, read_shot(tmp_path / "reconstruction.json", None))
+    with pytest.raises(UserError, match="written as"):
+        check_writable(tmp_path / "solve.json")
 
 
 def test_opensfm_is_read(tmp_path):
