@@ -15,8 +15,10 @@ from core.formats.shot_file import check_writable, write_shot
 from core.match.lens import coefficients, model_of
 from core.match.solve import report as judging
 from core.match.solve.held import Known, hold
-from core.match.solve.shot import shot_of
-from core.match.solve.solve import Options, Solution, observations_of, solve
+from core.match.solve.shot import FLIP, shot_of
+from core.match.solve.solve import Options, Solution, solve
+from core.match.solve.things import Found, Given, find_thing, without
+from core.match.solve.together import Pictures, together
 from core.match.track import Track
 
 
@@ -43,21 +45,31 @@ def check_outputs(outputs: Sequence[Path], page: Path | None) -> None:
 
 def solve_tracks(
     tracks: Sequence[Track], size: tuple[int, int], options: Options, outputs: Sequence[Path], page: Path | None,
-    telling: Report, title: str, picture: Any = None, known: Sequence[Known] = (),
+    telling: Report, title: str, picture: Any = None, known: Sequence[Known] = (), others: Sequence[Pictures] = (),
+    things: Sequence[Given] = (),
 ) -> Solved:
     """Solve, judge and write; `picture` reads a frame of the plate for the page, or is None; `known` holds the solve.
+
+    others : cameras that are solved together with the plate. things : what moves by itself before it.
 
     Raises
     ------
     UserError
         There is no camera to be trusted, or a file could not be written; the message says why.
     """
-    names = [track.name for track in tracks]
     with telling.stage("solve", "solving"):
-        observations, frames = observations_of(tracks)
-        solution = hold(solve(observations, frames, len(names), size, options, telling.words), names, known)
-        told = judging.report(solution, names)
-    shot = shot_of(solution, names)
+        observations, frames, names, views, said = together(without(tracks, things), size, others)
+        solution = solve(observations, frames, len(names), size, options, telling.words, views)
+        solution = hold(solution, names, known)
+        found = []
+        for given in things:
+            telling.words(f"where {given.name} is")
+            solution, thing = find_thing(solution, given, tracks)
+            found.append(thing)
+        told = judging.report(solution, names, said)
+        if found and not any(one.kind in MEASURES for one in known):
+            told = told._replace(warnings=(*told.warnings, SIZELESS))
+    shot = shot_of(solution, names)._replace(things=tuple(one.thing for one in found))
     with telling.stage("write", "writing"):
         for path in outputs:
             write_shot(path, shot, {"kind": told.kind, "rms_px": told.rms_px})
@@ -67,20 +79,21 @@ def solve_tracks(
             with atomic_write(page) as beside:
                 write_report(beside, solution, told, names, title, picture)
     written = [str(path) for path in (*outputs, *([page] if page is not None else []))]
-    known, state = solution.known, solution.state
+    state, own = solution.state, solution.views.camera == 0
+    known = solution.known & own
     focal = told.focal_px[known]
-    changes = solution.free.zoom is not None
+    changes = shot.zooms
     result = {
         "cameras": int(known.sum()), "points": int(solution.held.sum()), "observations": int(solution.used.sum()),
         "rms_px": told.rms_px, "median_px": told.median_px, "mean_px": told.mean_px, "p95_px": told.p95_px,
         "max_px": told.most_px, "focal_px": [float(f) for f in focal] if changes else float(focal[0]),
         "focal_sigma_px": told.focal_sigma_px, "path_sigma": told.path_sigma,
         "lens": {"model": model_of(state.lens).name, **coefficients(state.lens)},
-        "keyframes": [int(solution.frames[k]) for k in solution.keys], "kind": told.kind,
-        "frames": [int(solution.frames[0]), int(solution.frames[-1])], "seconds": telling.seconds,
+        "keyframes": [int(solution.frames[k]) for k in solution.keys if own[k]], "kind": told.kind,
+        "frames": [int(solution.frames[own][0]), int(solution.frames[own][-1])], "seconds": telling.seconds,
         "warnings": list(told.warnings), "advice": list(told.advice),
         "rejected": [names[k] for k in np.flatnonzero(~solution.held)], "outputs": written,
-        "peak_mb": peak_megabytes(),
+        "others": _others(solution, told, said), "things": [_thing(one) for one in found], "peak_mb": peak_megabytes(),
     }
     first = (
         f"{known.sum()} cameras ({told.kind}), {solution.held.sum()} points from {solution.used.sum():,} observations: "
@@ -88,4 +101,41 @@ def solve_tracks(
         + (f" to {focal[-1]:.1f} px" if changes else "")
         + (f" +- {told.focal_sigma_px:.1f}" if told.focal_sigma_px else "")
     )
-    return Solved(solution, told, names, result, [first, *told.advice, *written])
+    lines = [first]
+    if not own.all():
+        lines.append(f"{(solution.known & ~own).sum()} of {(~own).sum()} pictures of other cameras have a place")
+    lines += [
+        f"{one.thing.name}: {len(one.thing.frames)} poses, RMS {one.rms_px:.2f} px, turned to within "
+        f"{np.degrees(one.turn_sigma):.3f} degrees" for one in found]
+    return Solved(solution, told, names, result, [*lines, *told.advice, *written])
+
+
+MEASURES = ("survey", "distance")
+SIZELESS = (
+    "Nothing says how large the scene is, so things that move have their own size in it; give a distance or survey "
+    "points with --known, and both agree."
+)
+
+
+def _others(solution: Solution, told: judging.Report, said: Sequence[str]) -> list[dict[str, Any]]:
+    """Pictures of other cameras: where they were taken, y up, as the files of the camera have it."""
+    centres, found = solution.state.centres(), []
+    for row in np.flatnonzero(solution.known & (solution.views.camera > 0)):
+        matrix = np.eye(4)
+        matrix[:3, :3] = FLIP @ solution.state.rotation[row].T @ FLIP
+        matrix[:3, 3] = FLIP @ centres[row]
+        camera = solution.views.cameras[solution.views.camera[row]]
+        found.append({
+            "name": said[row], "focal_px": float(told.focal_px[row]), "k1": camera.k1, "k2": camera.k2,
+            "rms_px": float(told.by_frame[row]), "world_from_camera": matrix.tolist(),
+        })
+    return found
+
+
+def _thing(found: Found) -> dict[str, Any]:
+    frames = found.thing.frames
+    return {
+        "name": found.thing.name, "poses": len(frames), "frames": [int(frames[0]), int(frames[-1])],
+        "rms_px": found.rms_px, "turn_sigma_degrees": float(np.degrees(found.turn_sigma)),
+        "left_out": int((~found.moving.used).sum()),
+    }

@@ -10,7 +10,10 @@ import typer
 from app.report import Report
 from app.solving import check_outputs, solve_tracks
 from core.errors import UserError
+from core.formats.beside_file import is_photographs, read_beside, read_thing
+from core.formats.frame_decoder import FrameDecoder
 from core.formats.known_file import read_known
+from core.formats.picks_json import photographs_of
 from core.formats.track_file import read_tracks
 from core.match.lens import MODELS
 from core.match.solve.solve import Options
@@ -29,6 +32,8 @@ def command(
     readout: Annotated[float, typer.Option(min=-1.5, max=1.5, help="Rolling shutter: the part of a frame in which all rows are read, from above.")] = 0.0,
     free_readout: Annotated[bool, typer.Option("--free-readout", help="Find that part too, from --readout if it is given.")] = False,
     known: Annotated[Path | None, typer.Option(help="Hold the solve to survey points, .csv of name, x, y, z, sigma; or to constraints, .json.")] = None,
+    beside: Annotated[list[Path] | None, typer.Option("--with", help="Solve it together with a witness camera or photographs: .json, see docs/match.md; may be given again.")] = None,
+    things: Annotated[list[Path] | None, typer.Option("--object", help="A mesh that moves by itself, and the tracks on it: .json; may be given again.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page that says how good the solve is and what to mend: .html.")] = None,
     size: Annotated[str | None, typer.Option(help="Size of the plate where the file does not say, as 1920x1080.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -46,10 +51,25 @@ def command(
             if plate is None:
                 raise UserError(f"{tracks.name} does not say how large the plate is; give --size 1920x1080.")
             held = read_known(known) if known is not None else ()
-        done = solve_tracks(given.tracks, plate, asked, outputs, report, telling, tracks.stem, known=held)
+            others = [one for path in beside or () for one in read_beside(path, _sizes(path))]
+            moving = [read_thing(path, plate) for path in things or ()]
+        done = solve_tracks(
+            given.tracks, plate, asked, outputs, report, telling, tracks.stem, known=held, others=others, things=moving)
     for words in done.told.warnings:
         telling.note(words)
     telling.done(done.result, done.lines)
+
+
+def _sizes(path: Path) -> dict[Path, tuple[int, int]]:
+    """Width and height of the photographs a file names."""
+    if not is_photographs(path):
+        return {}
+    decoder = FrameDecoder()
+    try:
+        shapes = {file: decoder.decode(file)[0].shape for file in photographs_of(path)}
+    finally:
+        decoder.close()
+    return {file: (int(shape[1]), int(shape[0])) for file, shape in shapes.items()}
 
 
 def options_of(focal: float | None, free_focal: bool, zoom: bool, nodal: bool, lens: str) -> Options:

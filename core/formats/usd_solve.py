@@ -16,8 +16,9 @@ from core.errors import UserError
 from core.formats.sandbox import run_bounded
 from core.formats.shot_film import film_of, shot_of_film
 from core.formats.usd_camera_path import KEY
+from core.formats.usd_stage import define_mesh
 from core.match.lens import model_of
-from core.match.solve.shot import Shot
+from core.match.solve.shot import Shot, Thing
 
 SUFFIXES = (".usda", ".usdc", ".usd")
 POINT = 0.01  # width of a point over its distance
@@ -25,7 +26,8 @@ SECONDS, MEMORY = 60.0, 4 << 30
 
 
 def write(path: Path, shot: Shot, said: dict[str, Any], fps: float = 24.0) -> None:
-    """Write camera ``/Solve/camera`` and points ``/Solve/points``; frames are numbered as the plate's files are.
+    """Write camera ``/Solve/camera``, points ``/Solve/points`` and the meshes of what moves by itself below ``/Solve``;
+    frames are numbered as the plate's files are.
 
     said : more for the custom data of ``/Solve``, such as how good the solve is.
 
@@ -72,12 +74,29 @@ def write(path: Path, shot: Shot, said: dict[str, Any], fps: float = 24.0) -> No
     points.SetWidthsInterpolation(UsdGeom.Tokens.constant)
     names = points.GetPrim().CreateAttribute("primvars:trackNames", Sdf.ValueTypeNames.StringArray)
     names.Set(list(shot.names))
+    for thing in shot.things:
+        _write_thing(stage, thing)
     root.GetPrim().SetCustomDataByKey(KEY, {
         "width": width, "height": height, "lens": model_of(shot.lens).name,
         "lens_numbers": Vt.DoubleArray.FromNumpy(np.ascontiguousarray(shot.lens)), **said,
     })
     if not layer.Export(str(path)):
         raise UserError(f"{path.name} could not be written; look whether the folder is there and has room.")
+
+
+def _write_thing(stage: Any, thing: Thing) -> None:
+    """A mesh under a pose with a sample per frame."""
+    from pxr import Gf, Tf, UsdGeom
+
+    place = stage.GetDefaultPrim().GetPath()
+    name = Tf.MakeValidIdentifier(thing.name)
+    while stage.GetPrimAtPath(place.AppendChild(name)):
+        name += "_"
+    xform = UsdGeom.Xform.Define(stage, place.AppendChild(name))
+    pose = xform.MakeMatrixXform()
+    for matrix, frame in zip(thing.world, thing.frames, strict=True):
+        pose.Set(Gf.Matrix4d(matrix.T), float(frame))
+    define_mesh(stage, xform.GetPath().AppendChild("mesh"), thing.name, thing.mesh)
 
 
 def read_shot(path: Path) -> Shot:

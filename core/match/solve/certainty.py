@@ -29,6 +29,7 @@ from core.random import rand
 
 TESTED = (FOCAL, K1, ASPECT, CENTRE_X, CENTRE_Y)
 SAMPLES = 24
+TOLD = 1e-9  # of the strongest: a move that is held by what is known
 MOST = 300  # points the certainty is told from
 FLAT = 4.0  # standard deviations of the points: a plane as well as can be told
 
@@ -61,6 +62,8 @@ def _most_seen(solution: Solution) -> Rows:
     if len(held) <= MOST:
         return held
     seen = np.bincount(solution.observations.track[solution.used], minlength=len(solution.held))[held]
+    if solution.free.pull is not None:
+        seen[np.isin(held, solution.free.pull.points())] = len(solution.known) + 1
     return np.sort(held[np.argsort(-seen, kind="stable")[:MOST]])
 
 
@@ -92,14 +95,28 @@ class Certainty:
         self._lens = tuple(sorted({*TESTED, *solution.free.lens}))
         free = Free(frame=columns, lens=self._lens, zoom=None)
         normal = normal_equations(self._state, part, 0.0, free)
-        self._whole = reduced(normal, part, free, 1e-9, frames_out=True)
+        self._whole = self._pulled(reduced(normal, part, free, 1e-9, frames_out=True))
         zoom = solution.free.zoom
         self._zoom = None if zoom is None else zoom[np.ix_(self._known, self._known)]
         self.points = np.full((len(solution.held), 3, 3), np.nan)
         self._root = self._factor()
 
+    def _pulled(self, whole: Reduced | None) -> Reduced | None:
+        """The system with what is known of the points, which weighs as it did in the solve: in units of its noise."""
+        pull = self._solution.free.pull
+        if whole is None or pull is None:
+            return whole
+        _, right, matrix = pull.normal(self._solution.state.points)
+        columns = (3 * self._held[:, None] + np.arange(3)).ravel()
+        at = len(self._lens) + np.arange(len(columns))
+        noise = self._solution.sigma**2
+        whole.matrix[np.ix_(at, at)] += noise * matrix[np.ix_(columns, columns)]
+        whole.right[at] += noise * right.ravel()[columns]
+        return whole
+
     def _gauge(self) -> Array:
-        """(3 P, 7 or 3 + P) orthonormal moves of the points that no track can tell from a move of the cameras."""
+        """(3 P, 7 or 3 + P) orthonormal moves of the points that no track can tell from a move of the cameras, but for
+        those that what is known of the points tells."""
         points = self._state.points
         count = len(points)
         moves = [np.cross(axis, points) for axis in np.eye(3)]
@@ -109,7 +126,14 @@ class Certainty:
             moves += list(far)
         else:
             moves += [np.tile(axis, (count, 1)) for axis in np.eye(3)] + [points]
-        return np.linalg.qr(np.stack([move.ravel() for move in moves], axis=1))[0]
+        gauge = np.linalg.qr(np.stack([move.ravel() for move in moves], axis=1))[0]
+        pull = self._solution.free.pull
+        if pull is None:
+            return gauge
+        columns = (3 * self._held[:, None] + np.arange(3)).ravel()
+        held = pull.normal(self._solution.state.points)[2][np.ix_(columns, columns)]
+        values, axes = np.linalg.eigh(gauge.T @ held @ gauge)
+        return gauge @ axes[:, values < TOLD * max(float(values.max()), 1e-30)]
 
     def _factor(self) -> Array | None:
         """Inverse of the system of points (and zooms that were found), gauge fixed; (n, n) float64."""

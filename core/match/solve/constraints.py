@@ -229,6 +229,10 @@ class Pull:
         self.constraints, self._count, self._scale = tuple(constraints), points, max(scale, TINY)
         self._hard = hard
 
+    def points(self) -> list[int]:
+        """Rows of the points something is known of."""
+        return sorted({row for one in self.constraints for row in one.points})
+
     def cost(self, points: Array) -> float:
         """Sum of the whitened squares at points (P, 3)."""
         return sum(float(rows.residual @ rows.residual) for _, rows in self._all(points))

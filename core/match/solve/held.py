@@ -59,7 +59,7 @@ def hold(solution: Solution, names: Sequence[str], known: Sequence[Known]) -> So
         said = (*said, (
             f"What is known does not agree with the tracks: holding it raises their error {sigma / solution.sigma:.1f} "
             f"times. Look first at {worst.kind} of {', '.join(worst.points)}."))
-    return solution._replace(state=state, sigma=sigma, said=said)
+    return solution._replace(state=state, sigma=sigma, said=said, free=solution.free._replace(pull=pull))
 
 
 def _length(state: State, solution: Solution) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,8 +54,8 @@ class Report(NamedTuple):
     fixes: tuple[Fix, ...]
 
 
-def report(solution: Solution, names: list[str]) -> Report:
-    """Judge a solve; `names` of its tracks.
+def report(solution: Solution, names: list[str], said: Sequence[str] | None = None) -> Report:
+    """Judge a solve; `names` of its tracks, `said` what its frames are called, their numbers otherwise.
 
     Raises
     ------
@@ -62,6 +63,7 @@ def report(solution: Solution, names: list[str]) -> Report:
         The solve cannot be trusted; the message says why.
     """
     state, part = solution.state, solution.observations.take(solution.used)
+    said = said or [f"frame {number}" for number in solution.frames]
     whitened = residuals(state, part)
     length = np.linalg.norm(whitened, axis=1) / np.sqrt(part.root[:, 0] * part.root[:, 2])  # pixels again
     length = length * solution.pixel[part.frame]
@@ -99,12 +101,12 @@ def report(solution: Solution, names: list[str]) -> Report:
     warnings = [*solution.said, *_warnings(solution, noisy, out, path, sigma_f, tests)]
     typical = float(np.median(focal[solution.known & (solution.views.camera == 0)]))
     rms = float(np.sqrt((length**2).mean()))
-    fixes = certain.fixes(rms, by_frame, by_track, path)
+    fixes = tuple(fix for fix in certain.fixes(rms, by_frame, by_track, path) if fix.rms_px < rms or fix.share > MOVES)
     return Report(
         rms, float(np.median(length)), float(length.mean()),
         float(np.quantile(length, 0.95)), float(length.max()), by_frame, by_track, focal, sigma_f * typical, path,
         certain.points, certain.centres(), kind, tests, tuple(warnings),
-        _advice(solution, names, rms, by_frame, by_track, fixes), fixes,
+        _advice(solution, names, said, rms, by_frame, by_track, fixes), fixes,
     )
 
 
@@ -147,14 +149,20 @@ def _warnings(
             "pixel aspect": f"pixels seem {test.better:.4f} times as high as wide; check the pixel aspect",
         }.get(test.name, f"about {test.better:.1f} px would fit better; check whether the plate was cropped")
         said.append(f"{test.name[0].upper()}{test.name[1:]}: {value}.")
-    missing = int((~solution.known).sum())
-    if missing:
-        said.append(f"{missing} frames have no camera: too few tracks are seen there.")
+    missing = ~solution.known
+    if (missing & ~solution.views.alone).any():
+        said.append(
+            f"{int((missing & ~solution.views.alone).sum())} frames have no camera: too few tracks are seen there.")
+    if (missing & solution.views.alone).any():
+        said.append(
+            f"{int((missing & solution.views.alone).sum())} pictures of other cameras have no place: too little of the "
+            "plate is seen there.")
     return said
 
 
 def _advice(
-    solution: Solution, names: list[str], rms: float, by_frame: Array, by_track: Array, fixes: tuple[Fix, ...]
+    solution: Solution, names: list[str], said_of: Sequence[str], rms: float, by_frame: Array, by_track: Array,
+    fixes: tuple[Fix, ...],
 ) -> tuple[str, ...]:
     """What to mend next, worst first."""
     said = []
@@ -164,18 +172,18 @@ def _advice(
         more = " ..." if len(lost) > 8 else ""
         said.append(f"Look at the tracks that do not fit: {', '.join(lost[:8])}{more}.")
     for fix in helpful(fixes, by_frame, by_track):
-        name = f"track {names[fix.row]}" if fix.kind == "track" else f"frame {solution.frames[fix.row]}"
+        name = f"track {names[fix.row]}" if fix.kind == "track" else said_of[fix.row]
         own = (by_track if fix.kind == "track" else by_frame)[fix.row]
         moves = f" and the path moves by {fix.share:.1f} times its doubt" if fix.share > 1.0 else ""
         said.append(
-            f"Mend or leave out {name}, which misses by {own:.2f} px: the rest falls from {rms:.3f} to "
+            f"Mend or leave out {name}, which misses by {own:.2f} px: the rest goes from {rms:.3f} to "
             f"{fix.rms_px:.3f} px{moves}."
         )
     counts = np.bincount(solution.observations.frame[solution.used], minlength=len(solution.frames))
-    thin = np.flatnonzero(counts < 8)
+    thin = np.flatnonzero((counts < 8) & ~solution.views.alone)
     if len(thin):
         said.append(
-            f"Add tracks on frames {solution.frames[thin[0]]} to {solution.frames[thin[-1]]}: some have fewer than 8.")
+            f"Add tracks from {said_of[thin[0]]} to {said_of[thin[-1]]}: some have fewer than 8.")
     return tuple(said)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from core.match.lens import bent, start_lens
 from core.match.solve.solve import Solution
 from core.match.solve.state import ASPECT, CENTRE_X, CENTRE_Y, FOCAL, Array, Rows
+from core.match.solve.views import TIED
 from core.mesh.mesh import Mesh
 
 FLIP = np.diag([1.0, -1.0, -1.0])  # y down, z ahead <-> y up, z back
@@ -91,6 +92,8 @@ def shot_of(solution: Solution, names: list[str]) -> Shot:
     held = np.flatnonzero(solution.held)
     state = solution.state
     focal = np.exp(state.lens[FOCAL] + state.focal[known]) * solution.pixel[known]
+    if len(known) and np.ptp(focal) < 10.0 * TIED * focal[0]:  # held together, not equal
+        focal = np.full(len(known), focal.mean())
     lens = state.lens.copy()
     lens[FOCAL] = np.log(focal[0]) if len(known) else lens[FOCAL]
     return Shot(

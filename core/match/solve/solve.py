@@ -49,7 +49,8 @@ RAMPS = (0.35, -0.35)  # of the logarithm of the focal length from the first fra
 RAMPED = 0.9  # of the residuals: such a zoom or bend explains more
 LEFT_OUT, WANDERS = 0.1, 0.1  # share of the tracks that do not fit, and correlation of what the others miss by
 ROUNDS_OUT = 5  # of leaving out what does not fit; two, and more while slow slides are found
-ROUNDS, REFOCUSED = 2, 0.002  # of a camera whose distortion was taken out at a focal length that moved by this part
+ROUNDS, REFOCUSED = 3, 0.002  # of a camera whose distortion was taken out at a focal length that moved by this part
+REBENT = 1e-3  # of a number of a lens that was taken for another
 
 
 class Options(NamedTuple):
@@ -149,6 +150,8 @@ def solve(
     views = views or one_shot(len(frames), Camera(size))
     views = views._replace(cameras=(
         views.cameras[0]._replace(focal=options.focal, found=options.free_focal), *views.cameras[1:]))
+    if len(views.cameras) > 1 and options.lens != "brown":
+        views = views._replace(bend=start_lens(options.focal or float(size[0]), *size, options.lens))
     check(views)
     _check(observations, frames, tracks, views)
     if options.focal is not None or options.nodal:
@@ -157,7 +160,7 @@ def solve(
         guesses = [share * max(size) for share in FOCALS]
     found = _best(observations, frames, tracks, size, options, progress, views, guesses)
     for _ in range(ROUNDS):  # what bends the pictures of a camera is told over its focal length
-        better = _refocused(found)
+        better = _refocused(found, observations)
         if better is None:
             break
         found = _best(observations, frames, tracks, size, options, progress, better, guesses)
@@ -177,18 +180,51 @@ def solve(
     return found
 
 
-def _refocused(found: Solution) -> Views | None:
-    """Views with the focal lengths that were found, where one was and its distortion was taken out at another."""
+def _refocused(found: Solution, observations: Observations) -> Views | None:
+    """Views with what was found of each camera, where its pictures would be brought to those of the first otherwise:
+    the focal length their distortion was taken out at, that distortion, and how the first camera bends.
+
+    observations : as they were given.
+    """
     cameras = list(found.views.cameras)
     focal = np.exp(found.state.focal + found.state.lens[FOCAL]) * found.pixel
-    moved = False
+    moved, lens = False, found.state.lens
     for row, camera in enumerate(cameras):
         of_it = found.known & (found.views.camera == row)
-        if row and of_it.any() and (camera.found or camera.focal is None) and (camera.k1 or camera.k2):
-            now = float(np.median(focal[of_it]))
-            moved = moved or abs(now / guessed(camera) - 1.0) > REFOCUSED
-            cameras[row] = camera._replace(focal=now, found=True)
-    return found.views._replace(cameras=tuple(cameras)) if moved else None
+        if not row or not of_it.any():
+            continue
+        looked = camera.found or camera.focal is None
+        if camera.bends:
+            own = _own_lens(found, observations, row, camera, float(np.median(focal[of_it])), looked)
+            moved = moved or abs(own.k1 - camera.k1) > REBENT
+            cameras[row] = own
+        elif looked and (camera.k1 or camera.k2):
+            cameras[row] = camera._replace(focal=float(np.median(focal[of_it])), found=True)
+        moved = moved or abs(guessed(cameras[row]) / guessed(camera) - 1.0) > REFOCUSED
+    before = found.views.bend
+    bend = lens if len(cameras) > 1 and len(found.free.lens) > (FOCAL in found.free.lens) else before
+    if bend is not None and (before is None or np.abs(bend - before)[1:].max() > REBENT):
+        moved = True
+    return found.views._replace(cameras=tuple(cameras), bend=bend) if moved else None
+
+
+def _own_lens(
+    found: Solution, observations: Observations, row: int, camera: Camera, focal: float, looked: bool
+) -> Camera:
+    """Another camera with the bend, and the focal length where that is looked for, that its own pictures ask for while
+    the points stay where they are."""
+    frames = np.flatnonzero(found.known & (found.views.camera == row))
+    number = np.full(len(found.known), -1, np.int32)
+    number[frames] = np.arange(len(frames))
+    part = observations.take(found.used & (number[observations.frame] >= 0))
+    part = part._replace(frame=number[part.frame])
+    state = State(
+        np.ascontiguousarray(found.state.rotation[frames]), found.state.translation[frames], found.state.points,
+        np.zeros(len(frames)), camera.lens(focal))
+    free = Free(lens=(FOCAL, K1) if looked else (K1,), points=False)
+    lens = adjust(state, part, free, scale=2.5 * found.sigma).state.lens
+    own = float(np.exp(lens[FOCAL])) if looked else camera.focal
+    return camera._replace(k1=float(lens[K1]), focal=own, found=looked)
 
 
 def _best(

@@ -1,8 +1,8 @@
 """Who took which frame: a shot, photographs by themselves, witness cameras; and all of them seen as by one camera.
 
 The solver knows one lens. Pictures of other cameras are brought to it beforehand: their distortion is taken out, their
-centre and focal length become those of the lens. What is left of a focal length that was only guessed is a column of
-its frames, tied together by a stiff quadratic cost.
+centre and focal length become those of the lens, and they are bent as it bends. What is left of a focal length that was
+only guessed is a column of its frames, tied together by a stiff quadratic cost.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.match.lens import bent
 from core.match.solve.bundle import smooth_zoom
-from core.match.solve.state import K1, Array, Flags, Observations, Rows, bearings, start_lens
+from core.match.solve.state import FOCAL, K1, Array, Flags, Observations, Rows, bearings, start_lens
 
 TIED = 1e-5  # of a focal length, between frames of one camera
 FROM_WIDTH = 1.0  # the focal length over the width of a picture, where nobody knows
@@ -33,15 +34,25 @@ class Camera(NamedTuple):
     k1: float = 0.0
     k2: float = 0.0
     centre: tuple[float, float] | None = None
+    bends: bool = False
+
+    def lens(self, focal: float) -> Array:
+        """Its row of numbers (6,) at a focal length, see `core/match/lens.py`."""
+        lens = start_lens(focal, *self.size)
+        lens[K1 : K1 + 2] = self.k1, self.k2
+        if self.centre is not None:
+            lens[4:6] = self.centre
+        return lens
 
 
 class Views(NamedTuple):
     """alone : (F,) photographs without neighbours in time. camera : (F,) int32 rows of `cameras`, the first is the
-    shot's."""
+    shot's. bend : (L,) the lens of the first, as far as it is known to bend."""
 
     alone: Flags
     camera: Rows
     cameras: tuple[Camera, ...]
+    bend: Array | None = None
 
 
 def one_shot(frames: int, camera: Camera) -> Views:
@@ -74,16 +85,15 @@ def as_one(
     main = views.cameras[0]
     pixel = np.ones(len(views.camera))
     xy, root = observations.xy.copy(), observations.root.copy()
-    middle = start_lens(focal, *main.size)[4:6]
+    ours = start_lens(focal, *main.size) if views.bend is None else views.bend.copy()
+    ours[FOCAL] = np.log(focal)
+    middle = ours[4:6]
     for row, camera in enumerate(views.cameras):
         own = focal if row == 0 else guessed(camera)
         rows = views.camera[observations.frame] == row
-        lens = start_lens(own, *camera.size)
-        lens[K1 : K1 + 2] = camera.k1, camera.k2
-        if camera.centre is not None:
-            lens[4:6] = camera.centre
         if row or camera.k1 or camera.k2 or camera.centre is not None:
-            xy[rows] = bearings(lens, 0.0, xy[rows])[:, :2] * focal + middle
+            there = bent(ours, 0.0, np.ascontiguousarray(bearings(camera.lens(own), 0.0, xy[rows])[:, :2]))
+            xy[rows] = np.where(np.isfinite(there), there, 1e6)
         root[rows] *= own / focal
         pixel[views.camera == row] = own / focal
     if pace is not None:

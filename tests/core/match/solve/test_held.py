@@ -5,6 +5,7 @@ import pytest
 
 from core.errors import UserError
 from core.formats.known_file import read_known
+from core.match.solve.certainty import Certainty
 from core.match.solve.held import Known, hold
 from core.match.solve.shot import FLIP
 from core.match.solve.solve import Options, solve
@@ -54,6 +55,22 @@ def test_a_distance_gives_the_scale(solved):
     assert np.linalg.norm(done.state.points[i] - done.state.points[j]) == pytest.approx(length, rel=1e-3)
     path, truth = (state.centres()[-1] - state.centres()[0] for state in (done.state, made.truth))
     assert np.linalg.norm(path) == pytest.approx(np.linalg.norm(truth), rel=0.02)
+
+
+def test_the_doubt_of_the_cameras_is_that_of_the_survey(solved):
+    """Surveys that miss by as much as they say move the cameras by as much as is said."""
+    made, found = solved
+    up = made.truth.points @ FLIP
+    held, sigma = np.flatnonzero(found.held)[[0, 7, 15, 22, 30]], 0.02
+    rng = np.random.default_rng(2)
+    squares = []
+    for _ in range(10):
+        known = [Known("survey", (NAMES[k],), tuple(up[k] + rng.normal(0, sigma, 3)), sigma) for k in held]
+        done = hold(found, NAMES, known)
+        spread = Certainty(done).centres()[::10]
+        away = (done.state.centres() - made.truth.centres())[::10]
+        squares.append(np.einsum("fi,fij,fj->f", away, np.linalg.inv(spread), away) / 3)
+    assert 0.6 < np.mean(squares) < 1.5
 
 
 @pytest.mark.parametrize(("rows", "words"), [
