@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from app.report import Report
@@ -13,9 +14,10 @@ from core.errors import UserError
 from core.formats.beside_file import is_photographs, read_beside, read_thing
 from core.formats.frame_decoder import FrameDecoder
 from core.formats.known_file import read_known
+from core.formats.lens_file import read_lens
 from core.formats.picks_json import photographs_of
 from core.formats.track_file import read_tracks
-from core.match.lens import MODELS
+from core.match.lens import MODELS, model_of
 from core.match.solve.solve import Options
 
 LENSES = ("none", *(model.name for model in MODELS))
@@ -28,6 +30,7 @@ def command(
     free_focal: Annotated[bool, typer.Option("--free-focal", help="Find the focal length too, from --focal-px if it is given.")] = False,
     zoom: Annotated[bool, typer.Option("--zoom", help="The focal length changes over the shot.")] = False,
     lens: Annotated[str, typer.Option(help="Find the bend of the lens too: brown, fisheye, or of 3DEqualizer radial4 and anamorphic4.")] = "none",
+    lens_file: Annotated[Path | None, typer.Option(help="A lens that was measured, of filoplume grid (.json), 3DEqualizer (.txt) or another solve; its focal length counts where --focal-px is not given.")] = None,
     nodal: Annotated[bool, typer.Option("--nodal", help="The camera only turns, as on a tripod.")] = False,
     readout: Annotated[float, typer.Option(min=-1.5, max=1.5, help="Rolling shutter: the part of a frame in which all rows are read, from above.")] = 0.0,
     free_readout: Annotated[bool, typer.Option("--free-readout", help="Find that part too, from --readout if it is given.")] = False,
@@ -50,6 +53,8 @@ def command(
             plate = plate or given.size
             if plate is None:
                 raise UserError(f"{tracks.name} does not say how large the plate is; give --size 1920x1080.")
+            if lens_file is not None:
+                asked = _with_lens(asked, lens_file, plate)
             held = read_known(known) if known is not None else ()
             others = [one for path in beside or () for one in read_beside(path, _sizes(path))]
             moving = [read_thing(path, plate) for path in things or ()]
@@ -58,6 +63,17 @@ def command(
     for words in done.told.warnings:
         telling.note(words)
     telling.done(done.result, done.lines)
+
+
+def _with_lens(asked: Options, path: Path, plate: tuple[int, int]) -> Options:
+    """The options with the lens of a file, which is of plates of the same shape."""
+    row, size = read_lens(path, plate)
+    if asked.distortion:
+        raise UserError("--lens-file gives the bend of the lens and --lens finds it; say one of them.")
+    if size != plate:
+        raise UserError(
+            f"{path.name} is of pictures of {size[0]} x {size[1]} pixels, the plate has {plate[0]} x {plate[1]}.")
+    return asked._replace(focal=asked.focal or float(np.exp(row[0])), given=row, lens=model_of(row).name)
 
 
 def _sizes(path: Path) -> dict[Path, tuple[int, int]]:

@@ -17,7 +17,7 @@ from core.match.lens_maps import canvas, redistort_map, undistort_map
 
 
 def command(
-    lens: Annotated[Path, typer.Argument(help="A solve (.usda, .json) or a lens of 3DEqualizer (.txt).", show_default=False)],
+    lens: Annotated[Path, typer.Argument(help="A solve (.usda), a lens (.json), or one of 3DEqualizer (.txt).", show_default=False)],
     undistort: Annotated[Path | None, typer.Option("--undistort", help="Map from the plate to the straight picture: .exr.")] = None,
     redistort: Annotated[Path | None, typer.Option("--redistort", help="Map from the straight picture to the plate: .exr.")] = None,
     overscan: Annotated[float | None, typer.Option(min=0.0, max=200.0, help="Room on every side in percent of the plate; as much as the lens needs otherwise.")] = None,

@@ -1,4 +1,5 @@
-"""Lenses as files: those of 3DEqualizer (.txt, as its lens export writes them) and what a solve wrote into USD.
+"""Lenses as files: those of 3DEqualizer (.txt, as its lens export writes them), our own (.json) and what a solve wrote
+into USD. Ours is ``{"size": [w, h], "model": NAME, "numbers": [...]}``, the numbers of `core/match/lens.py`.
 
 3DEqualizer measures in centimetres of the filmback, y up, its coordinates are over half the diagonal of the filmback
 ("3DE4 Radial - Standard, Degree 4", "3DE4 Anamorphic - Standard, Degree 4", Lens Distortion Plugin Kit).
@@ -8,14 +9,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from core.errors import UserError
-from core.match.lens import Array, model_of, start_lens
+from core.formats.given_file import decoded_json
+from core.match.lens import Array, model_named, model_of, start_lens
 from core.match.lens_kernels import UNIT
 
 FILM = 3.6  # centimetres across, of filmbacks that are written
 LARGEST = 1 << 20
+WRITTEN = (".json", ".txt")
 RADIAL = "3DE4 Radial - Standard, Degree 4"
 ANAMORPHIC = "3DE4 Anamorphic - Standard, Degree 4"
 RADIAL_COLUMNS = {
@@ -28,6 +32,34 @@ ANAMORPHIC_COLUMNS = {
     "Squeeze-X": 16, "Squeeze-Y": 17,
 }  # fmt: skip
 PHI, BENDING, TURN = "Phi - Cylindric Direction", "B - Cylindric Bending", "Lens Rotation"
+
+
+class _Lens(msgspec.Struct):
+    size: tuple[int, int]
+    model: str
+    numbers: list[float]
+
+
+def write_lens(path: Path, lens: Array, size: tuple[int, int], suffix: str) -> None:
+    """Write a lens in the format of `suffix` to the (temporary) path given.
+
+    Raises
+    ------
+    UserError
+        3DEqualizer has no such model here.
+    """
+    if suffix.lower() == ".txt":
+        path.write_text(lens_text(lens, size), encoding="utf-8")
+    else:
+        path.write_bytes(msgspec.json.encode(_Lens(size, model_of(lens).name, lens.tolist())))
+
+
+def _own_lens(path: Path) -> tuple[Array, tuple[int, int]]:
+    file = decoded_json(path, _Lens, "a lens", LARGEST)
+    lens = np.array(file.numbers, np.float64)
+    if len(lens) != model_named(file.model).columns or not np.isfinite(lens).all() or min(file.size) < 1:
+        raise UserError(f"{path.name} does not hold the numbers of a lens of the model {file.model}.")
+    return lens, file.size
 
 
 def lens_text(lens: Array, size: tuple[int, int], name: str = "Filoplume") -> str:
@@ -130,8 +162,10 @@ def read_lens(path: Path, size: tuple[int, int] | None) -> tuple[Array, tuple[in
     if path.suffix.lower() in SUFFIXES:
         shot = read_shot(path)
         return shot.lens, shot.size
+    if path.suffix.lower() == ".json":
+        return _own_lens(path)
     if path.suffix.lower() != ".txt":
-        raise UserError(f"{path.name}: lenses are read from {', '.join(SUFFIXES)} and .txt of 3DEqualizer.")
+        raise UserError(f"{path.name}: lenses are read from {', '.join(SUFFIXES)}, .json, and .txt of 3DEqualizer.")
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path.name} is too large for a lens.")
     if size is None:

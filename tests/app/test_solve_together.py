@@ -1,18 +1,24 @@
 """The command solves a plate together with a witness, photographs and a mesh that moves by itself."""
 
 import json
+import os
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
 from scipy.spatial.transform import Rotation
 
+from core.formats.lens_file import read_lens
 from core.match.solve.shot import FLIP
+from core.match.solve.state import projected
 from tests.app.command_line import filoplume
 from tests.core.match.solve.shots import SIZE, shot
 from tests.core.match.solve.test_moving import HEAD, _head
 from tests.core.match.solve.test_views import PHONE, _stills
+
+DATA = os.environ.get("FILOPLUME_DATA")
 
 
 def _tracks(rows, prefix: str, first: int) -> list[dict]:
@@ -86,6 +92,36 @@ def test_a_witness_and_photographs_stand_where_they_stood_and_the_head_is_in_the
         assert np.degrees(apart) < 0.2
         there = points @ truth.rotation[row].T + truth.translation[row]
         np.testing.assert_allclose((seen[:2] / -seen[2]).T * [1, -1], there[:, :2] / there[:, 2:], atol=1.0 / 1600)
+
+
+@pytest.mark.skipif(DATA is None, reason="FILOPLUME_DATA is not set")
+def test_a_lens_of_a_chessboard_is_given_to_a_solve_and_to_maps(tmp_path):
+    folder = Path(str(DATA)) / "matchmove" / "stereo_chessboard_1" / "calib_imgs" / "1"
+    photographs = [folder / f"left{k}.jpg" for k in (1, 11, 12, 13)]
+    done = filoplume("grid", *photographs, "--grid", "9x6", "-o", tmp_path / "lens.json", "--json")
+    told = json.loads(done.stdout)
+    assert (told["photographs"], told["warnings"]) == (4, [])
+    assert told["rms_px"] < 0.5
+    lens, size = read_lens(tmp_path / "lens.json", None)
+    assert told["focal_px"] == pytest.approx(np.exp(lens[0]))
+    made = shot("orbit", 40, 20, seed=2)
+    truth = made.truth._replace(lens=lens)
+    xy, depth = projected(truth, made.observations.frame, truth.points[made.observations.track])
+    inside = np.flatnonzero((depth > 0) & (xy > 0).all(1) & (xy < size).all(1))
+    rows = made.observations._replace(xy=xy + np.random.default_rng(0).normal(0, 0.1, xy.shape)).take(inside)
+    (tmp_path / "plate.json").write_text(json.dumps({"size": size, "tracks": _tracks(rows, "t", 1)}))
+    given = ("--lens-file", tmp_path / "lens.json")
+    told = json.loads(filoplume("solve", tmp_path / "plate.json", *given, "-o", tmp_path / "a.usda", "--json").stdout)
+    assert told["rms_px"] < 0.2
+    assert not told["warnings"]
+    np.testing.assert_allclose(read_lens(tmp_path / "a.usda", None)[0], lens, atol=1e-6)
+    alone = json.loads(filoplume(
+        "solve", tmp_path / "plate.json", "--focal-px", np.exp(lens[0]), "--json").stdout)
+    assert "warnings" not in alone or alone["warnings"]
+    assert filoplume("stmap", tmp_path / "lens.json", "--undistort", tmp_path / "u.exr").returncode == 0
+    wrong = json.loads((tmp_path / "lens.json").read_text()) | {"size": [320, 180]}
+    (tmp_path / "lens.json").write_text(json.dumps(wrong))
+    assert "320 x 180" in filoplume("solve", tmp_path / "plate.json", *given).stderr
 
 
 @pytest.mark.parametrize(("content", "words"), [

@@ -56,7 +56,8 @@ REBENT = 1e-3  # of a number of a lens that was taken for another
 class Options(NamedTuple):
     """focal : pixels, or None. free_focal : find it too. zoom : it changes from frame to frame.
     distortion : find the bend of the lens too. nodal : the camera only turns. lens : a model of core/match/lens.py.
-    readout : share of a frame in which a rolling shutter reads all rows, from above. free_readout : find it too."""
+    readout : share of a frame in which a rolling shutter reads all rows, from above. free_readout : find it too.
+    given : (L,) a lens that was measured; its bend stays, its focal length is a beginning where `focal` is None."""
 
     focal: float | None = None
     free_focal: bool = False
@@ -66,6 +67,15 @@ class Options(NamedTuple):
     lens: str = "brown"
     readout: float = 0.0
     free_readout: bool = False
+    given: Array | None = None
+
+    def lens_at(self, focal: float, size: tuple[int, int]) -> Array:
+        """The lens a solve begins with at a focal length in pixels."""
+        if self.given is None:
+            return start_lens(focal, *size, self.lens)
+        lens = self.given.copy()
+        lens[FOCAL] = np.log(focal)
+        return lens
 
 
 AS_GIVEN = Options()
@@ -150,8 +160,8 @@ def solve(
     views = views or one_shot(len(frames), Camera(size))
     views = views._replace(cameras=(
         views.cameras[0]._replace(focal=options.focal, found=options.free_focal), *views.cameras[1:]))
-    if len(views.cameras) > 1 and options.lens != "brown":
-        views = views._replace(bend=start_lens(options.focal or float(size[0]), *size, options.lens))
+    if options.given is not None or (len(views.cameras) > 1 and options.lens != "brown"):
+        views = views._replace(bend=options.lens_at(options.focal or float(size[0]), size))
     check(views)
     _check(observations, frames, tracks, views)
     if options.focal is not None or options.nodal:
@@ -365,7 +375,7 @@ class _Problem:
         self.pixels, told = _noise(self.observations, views, size)
         self.noise = self.pixels * float(np.median(self.observations.root[:, 0]))
         self.least = self.noise if told else 0.2 * self.noise  # photographs may be seen better than usual
-        self.options, self.lens, self.progress = options, start_lens(focal, *size, options.lens), progress
+        self.options, self.lens, self.progress = options, options.lens_at(focal, size), progress
         self.keys = self._keys()
         self.part = self._of_keyframes()
 
