@@ -7,6 +7,7 @@ but a repaint. No font comes with the program: it asks for families that read we
 from __future__ import annotations
 
 import re
+from functools import cache
 from importlib import resources
 from string import Template
 
@@ -103,8 +104,9 @@ class Look(Record):
         return max(9, round(self.text * 0.85))
 
 
+@cache
 def load_theme(name: str) -> Theme:
-    """The theme of that name from resources/themes."""
+    """The theme of that name from resources/themes, read once."""
     return msgspec.json.decode((resources.files("resources") / "themes" / f"{name}.json").read_bytes(), type=Theme)
 
 
