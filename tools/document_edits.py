@@ -75,7 +75,8 @@ def add_mesh_file(document: Document, found: MeshFile, source: str) -> Document:
 
 def space_given(found: MeshFile) -> tuple[float, str]:
     """Metres per unit and up axis that were given when the file was read; 0 and "" where nobody gave them."""
-    return (found.metres_per_unit, found.up) if found.unit_source == "given" else (0.0, "")
+    return (
+        found.metres_per_unit if found.unit_source == "given" else 0.0, found.up if found.up_source == "given" else "")
 
 
 def remove_mesh(document: Document, mesh_id: int) -> Document:
@@ -176,6 +177,20 @@ def reload_mesh(
     return set_mesh_source(replace_mesh(document, mesh_id, found.mesh), mesh_id, source, *space_given(found))
 
 
+def with_mesh_as_read(document: Document, mesh_id: int, found: MeshFile) -> Document:
+    """The document with the file of a mesh as it was read in another unit or with another axis up.
+
+    Hair comes along; a groom that has its first reach yet gets that of the new size.
+    """
+    before, now = first_reach(find_mesh(document, mesh_id).mesh), first_reach(found.mesh)
+    document = replace_mesh(document, mesh_id, found.mesh)
+    item = find_mesh(document, mesh_id)
+    for groom in document.grooms:
+        if groom.mesh_id == mesh_id and groom.coat.reach == before:
+            document = with_groom(document, groom.replace(coat=groom.coat.replace(reach=now)))
+    return set_mesh_source(document, mesh_id, item.source, *space_given(found))
+
+
 def read_mesh_again(
     item: MeshObject, path: Path, unit: str | None = None, up: str | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -233,10 +248,14 @@ def add_empty_groom(document: Document, mesh_id: int, name: str = "groom", point
 
     Its hair grows around the guides only, up to a twentieth of the size of the animal.
     """
-    points_at_rest = find_mesh(document, mesh_id).mesh.points
-    size = float(np.linalg.norm(np.ptp(points_at_rest, axis=0))) if len(points_at_rest) else 0.0
-    coat = Coat(reach=min(float(f"{FIRST_REACH * size:.2g}"), LONGEST))
+    coat = Coat(reach=first_reach(find_mesh(document, mesh_id).mesh))
     return add_groom(document, Groom(id=0, name=_name(name), mesh_id=mesh_id, guides=no_guides(points), coat=coat))
+
+
+def first_reach(mesh: Mesh) -> float:
+    """How far the hair of a groom planted by hand grows around its guides at first, metres."""
+    size = float(np.linalg.norm(np.ptp(mesh.points, axis=0))) if len(mesh.points) else 0.0
+    return min(float(f"{FIRST_REACH * size:.2g}"), LONGEST)
 
 
 def remove_feathers_with_keys(document: Document, coat_id: int) -> Document:

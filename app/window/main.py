@@ -108,7 +108,7 @@ class MainWindow(QMainWindow):
         self.middle = QStackedWidget()
         self.recovery = RecoveryBar(self.desk)
         self.unit = UnitBar(self.desk, self.opening.read_as)
-        self.opening.unit_assumed.connect(self.unit.offer)
+        self.opening.assumed.connect(self.unit.offer)
         self.crash = CrashBar(self.crash_watch)
         self.plugins = PluginBar(session.tools.troubles)
         self.status = StatusLine(self.desk, self.hotkeys)

@@ -68,7 +68,7 @@ class MeshFile(NamedTuple):
     """A mesh as read and repaired.
 
     mesh : metres, Y up. name : of the file, without its suffix.
-    metres_per_unit, up, unit_source : the space that was used and who said so: "file", "given" or "assumed".
+    metres_per_unit, up : the space that was used. unit_source, up_source : who said so: "file", "given" or "assumed".
     problems : how many of each kind were met (words in ``core.mesh.repair.PROBLEMS``); notes : sentences to show.
     vertices, faces : counts in the file. vertex_of_file, face_of_file : where each went (-1: a face left out).
     closed : the surface has an inside.
@@ -79,6 +79,7 @@ class MeshFile(NamedTuple):
     metres_per_unit: float
     up: str
     unit_source: str
+    up_source: str
     problems: dict[str, int]
     notes: tuple[str, ...]
     vertices: int
@@ -134,7 +135,7 @@ def read_mesh(
         assert say is not None
         say(note)
     return MeshFile(
-        repaired.mesh, path.stem, space.metres, space.up, space.source, repaired.problems, notes,
+        repaired.mesh, path.stem, space.metres, space.up, space.source, space.up_source, repaired.problems, notes,
         len(polygons.points), len(polygons.counts), repaired.vertex_of_source, repaired.face_of_source,
         repaired.closed,
     )  # fmt: skip

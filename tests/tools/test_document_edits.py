@@ -9,7 +9,7 @@ import pytest
 import tools.document_edits as edits
 from core.document import Document
 from core.errors import UserError
-from core.formats.mesh_file import write_mesh
+from core.formats.mesh_file import read_mesh, write_mesh
 from core.formats.project import read_project, write_project
 from core.groom.groom import Map
 from core.groom.length import lengths
@@ -166,6 +166,20 @@ def test_a_mesh_is_read_again_in_the_unit_that_was_given_for_it(tmp_path):
     assert (kept.source, kept.source_unit, kept.source_up) == (str(path), 0.01, "z")
     inches = edits.reload_mesh(again, again.meshes[0].id, unit="in")
     assert (inches.meshes[0].source_unit, inches.meshes[0].source_up) == (0.0254, "z")
+
+
+def test_a_mesh_as_read_in_another_unit_takes_the_place_of_itself(tmp_path):
+    path = tmp_path / "ball.obj"
+    write_mesh(path, ball().skin.mesh)
+    start = edits.add_empty_groom(edits.import_mesh(Document(), path), 1)
+    start = edits.add_empty_groom(start, 1, "chosen")
+    start = edits.set_coat(start, 2, reach=0.03)
+    after = edits.with_mesh_as_read(start, 1, read_mesh(path, unit="cm", up="z"))
+    points = start.meshes[0].mesh.points
+    np.testing.assert_allclose(after.meshes[0].mesh.points, 0.01 * points[:, [0, 2, 1]] * [1, 1, -1], atol=1e-6)
+    assert (after.meshes[0].source_unit, after.meshes[0].source_up) == (0.01, "z")
+    assert after.grooms[0].coat.reach == pytest.approx(0.01 * start.grooms[0].coat.reach, rel=0.05)
+    assert after.grooms[1].coat.reach == 0.03, "an artist's own"
 
 
 def test_hair_and_maps_are_kept_on_a_finer_mesh(tmp_path):

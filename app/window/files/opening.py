@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from PySide6.QtCore import QMimeData, QObject, QUrl, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
@@ -25,7 +25,7 @@ from core.formats.project import Project, read_project
 from core.formats.rig_assembly import NoRig, RigFile
 from core.formats.rig_file import document_of, read_rig
 from core.workspace import Reference
-from tools.document_edits import add_empty_groom, add_mesh_file
+from tools.document_edits import add_empty_groom, add_mesh_file, with_mesh_as_read
 from tools.pose_edits import add_rig, play_clip_file
 from tools.session import Session
 
@@ -34,6 +34,7 @@ MESH_SUFFIXES = mesh_file.READ_SUFFIXES
 RIG_SUFFIXES = rig_file.READ_SUFFIXES
 CLIP_SUFFIXES = (".bvh",)  # motion of joints without a mesh
 PICTURE_SUFFIXES = picture.READ_SUFFIXES
+OTHER_UP = {"y": "z", "z": "y"}
 DEMO_GUIDES, DEMO_HAIRS = 2_500, 100_000
 _STAGES = 6  # of the demo, about
 
@@ -42,6 +43,14 @@ class MakeSession(Protocol):
     """Makes the sessions of a window, with its journal and its tools."""
 
     def __call__(self, document: Document | None = None, *args: Any, **settings: Any) -> Session: ...
+
+
+class Assumed(NamedTuple):
+    """A mesh that came in from a file which does not say its unit, or which axis is up."""
+
+    mesh_id: int
+    path: Path
+    found: MeshFile
 
 
 class Opening(QObject):
@@ -53,11 +62,11 @@ class Opening(QObject):
     make : makes sessions. remember : called with every file that was opened. open_plate : opens a plate.
 
     opened : a document or a mesh came in; a view may frame it.
-    unit_assumed : after it, of a mesh whose file does not say its unit: path, MeshFile, the unit it was read with.
+    assumed : after it, of a mesh whose file does not say its unit or its up axis: an `Assumed`.
     """
 
     opened = Signal()
-    unit_assumed = Signal(object, object, str)
+    assumed = Signal(object)
 
     def __init__(
         self, desk: Desk, parent: QWidget | None = None, make: MakeSession = Session,
@@ -144,37 +153,47 @@ class Opening(QObject):
 
         self._desk.jobs.start(f"Open {path.name}", lambda progress, cancelled: read_project(path, hashes), done)
 
-    def read_as(self, path: Path, unit: str, up: str) -> None:
-        """Read the mesh that has just come in again, in this unit and with this axis up, in place of itself."""
-        before = self._desk.document
+    def read_as(self, these: Sequence[Assumed], unit: str | None = None, turn: bool = False) -> None:
+        """Read meshes that came in again, in place of themselves: in another unit, or with their other axis up."""
 
-        def instead(path: Path, found: MeshFile) -> None:
-            if self._desk.document is not before:
-                self._desk.error(UserError(f"The document was changed while {path.name} was read; import it again."))
-                return
-            if self._desk.session.history.undo_name is None:
-                self._open_mesh(path, found)
-                return
-            self._desk.session.undo()
-            self._import_mesh(path, found)
+        def work(progress: Progress, cancelled: Asked) -> list[MeshFile]:
+            return [
+                read_mesh(
+                    path, unit=unit or found.metres_per_unit, up=OTHER_UP[found.up] if turn else found.up,
+                    cancel=cancelled)
+                for _, path, found in these
+            ]
 
-        self._read_mesh(path, instead, unit, up)
+        def done(read: list[MeshFile]) -> None:
+            def put(document: Document) -> Document:
+                for (mesh_id, _, _), found in zip(these, read, strict=True):
+                    document = with_mesh_as_read(document, mesh_id, found)
+                return document
 
-    def _read_mesh(
-        self, path: Path, then: Callable[[Path, MeshFile], None], unit: str | None = None, up: str | None = None
-    ) -> None:
+            if self._desk.edit("Turn upright" if turn else "Read in another unit", put):
+                self.opened.emit()
+                for (mesh_id, path, _), found in zip(these, read, strict=True):
+                    self.assumed.emit(Assumed(mesh_id, path, found))
+
+        what = these[0].path.name if len(these) == 1 else f"{len(these)} meshes"
+        self._desk.jobs.start(f"Read {what}", work, done)
+
+    def _read_mesh(self, path: Path, then: Callable[[Path, MeshFile], int | None]) -> None:
+        """Read a mesh; `then` puts it into a document and says under which id, None where it could not."""
+
         def done(found: MeshFile) -> None:
-            then(path, found)
+            mesh_id = then(path, found)
+            if mesh_id is None:
+                return
             self._remember(path)
             if found.notes:
                 self._desk.said.emit(" ".join(without_options(note) for note in found.notes))
             self.opened.emit()
-            if found.unit_source != "file":
-                self.unit_assumed.emit(path, found, unit or "m")
+            if (found.unit_source, found.up_source) != ("file", "file"):
+                self.assumed.emit(Assumed(mesh_id, path, found))
 
         self._desk.jobs.start(
-            f"Read {path.name}",
-            lambda progress, cancelled: read_mesh(path, unit=unit, up=up, cancel=cancelled), done)
+            f"Read {path.name}", lambda progress, cancelled: read_mesh(path, cancel=cancelled), done)
 
     def _read_rig(self, path: Path, new: bool) -> None:
         """Open a rig in the craft of posing; a file of the format in which nothing moves is a mesh."""
@@ -219,16 +238,19 @@ class Opening(QObject):
 
         self._desk.jobs.start(f"Read {path.name}", lambda progress, cancelled: read_rig(path, cancel=cancelled), done)
 
-    def _open_mesh(self, path: Path, found: MeshFile) -> None:
+    def _open_mesh(self, path: Path, found: MeshFile) -> int | None:
         document = with_mesh_to_plant(Document(), found, str(path.absolute()))
         self._desk.replace_session(self._make(document, name=f"Open {path.name}"[:255]))
         self._desk.set_workspace(frame=float(document.first_frame))
+        return document.meshes[-1].id
 
-    def _import_mesh(self, path: Path, found: MeshFile) -> None:
-        if self._desk.edit("Import mesh", with_mesh_to_plant, found, str(path.absolute())):
-            document = self._desk.document
-            added = document.meshes[-1].id
-            self._desk.set_workspace(groom=next(g.id for g in document.grooms if g.mesh_id == added))
+    def _import_mesh(self, path: Path, found: MeshFile) -> int | None:
+        if not self._desk.edit("Import mesh", with_mesh_to_plant, found, str(path.absolute())):
+            return None
+        document = self._desk.document
+        added = document.meshes[-1].id
+        self._desk.set_workspace(groom=next(g.id for g in document.grooms if g.mesh_id == added))
+        return added
 
     def _show(self, session: Session, frame: int | None) -> None:
         self._desk.replace_session(session)
