@@ -1,4 +1,4 @@
-"""The evaluator: remembers what pure functions made of immutable inputs, and owns the large mutable buffers."""
+"""The evaluator: remembers what pure functions made of immutable inputs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
 from core.leaves import leaves
 from core.record import is_frozen
@@ -32,12 +31,10 @@ class Evaluator:
     """Derived data by the identity of what it was derived from, within `budget` bytes; used from any thread.
 
     workers : the one pool of threads.
-    buffers : named arrays that may be written to (children, arrays bound for the GPU); see :meth:`buffer`.
     """
 
     def __init__(self, budget: int = DEFAULT_BUDGET, workers: Workers | None = None) -> None:
         self.workers = workers if workers is not None else Workers()
-        self.buffers: dict[Hashable, NDArray[Any]] = {}
         self._budget = budget
         self._used = 0
         self._entries: OrderedDict[Key, _Entry] = OrderedDict()
@@ -93,23 +90,15 @@ class Evaluator:
             self._bury()
             return self._find((function, plain, tuple(map(id, inputs))), inputs) is not None
 
-    def buffer(self, name: Hashable, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-        """The writable array of that name; a new one of zeros when it does not exist in this shape and dtype."""
-        have = self.buffers.get(name)
-        if have is None or have.shape != shape or have.dtype != np.dtype(dtype):
-            have = self.buffers[name] = np.zeros(shape, dtype)
-        return have
-
     def forget(self) -> None:
-        """Drop everything remembered and every buffer."""
+        """Drop everything remembered."""
         with self._lock:
             for key in list(self._entries):
                 self._remove(key)
-            self.buffers.clear()
 
     @property
     def bytes(self) -> int:
-        """Bytes of the values remembered (buffers not counted)."""
+        """Bytes of the values remembered."""
         with self._lock:
             self._bury()
             return self._used

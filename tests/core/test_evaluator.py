@@ -142,12 +142,3 @@ def test_an_exception_is_not_remembered(evaluator):
     with pytest.raises(ValueError, match="once"):
         evaluator.get(fail_once, a)
     assert evaluator.get(fail_once, a) == 5
-
-
-def test_buffers_keep_their_contents_until_their_shape_changes(evaluator):
-    buffer = evaluator.buffer("children", (4, 2), np.float32)
-    buffer[:] = 7
-    assert evaluator.buffer("children", (4, 2), np.float32) is buffer
-    assert not evaluator.buffer("children", (5, 2), np.float32).any()
-    evaluator.forget()
-    assert evaluator.buffers == {}

@@ -54,13 +54,25 @@ def host(qtbot: QtBot) -> Iterator[Host]:
     host.deleteLater()
 
 
+class KeptEvaluator(Evaluator):
+    """Remembers what one window's animal took to make for the next window, which closes it as little."""
+
+    def close(self) -> None:
+        """Nothing: the end of the tests is its end."""
+
+
 @pytest.fixture(scope="session")
-def animal() -> Document:
+def evaluator() -> Iterator[Evaluator]:
+    """What the windows of all tests remember; by identity, so no test can see another's document."""
+    kept = KeptEvaluator()
+    yield kept
+    Evaluator.close(kept)
+
+
+@pytest.fixture(scope="session")
+def animal(evaluator: Evaluator) -> Document:
     """The demo animal with few guides and hairs."""
-    evaluator = Evaluator()
-    document = demo_document(evaluator, hairs=4000, guides=400)
-    evaluator.close()
-    return document
+    return demo_document(evaluator, hairs=4000, guides=400)
 
 
 @pytest.fixture
@@ -72,14 +84,14 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def opened(qtbot: QtBot, home: Path) -> Iterator[Opened]:
+def opened(qtbot: QtBot, home: Path, evaluator: Evaluator) -> Iterator[Opened]:
     """Opens real main windows: ``opened(document, keymap="maya")`` gives a hand at one."""
     if OFFSCREEN is not None or os.environ.get("QT_QPA_PLATFORM") == "offscreen":
         pytest.skip(OFFSCREEN or "windows are offscreen")
     windows: list[MainWindow] = []
 
     def open_one(document: Document | None = None, **settings: object) -> Hand:
-        session = Session(document, fresh_workspace(), journal=Journal())
+        session = Session(document, fresh_workspace(), journal=Journal(), evaluator=evaluator)
         window = MainWindow(session, Settings(**settings))  # type: ignore[arg-type]
         window.resize(900, 640)
         windows.append(window)
