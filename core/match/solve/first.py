@@ -15,6 +15,7 @@ from core.match.solve.state import FRAME_FOCAL, Array, Flags, Observations, Stat
 LEAST_COMMON = 6  # tracks of a pair
 ENOUGH_PARALLAX = 0.12  # radians; more makes a pair no better
 PAIRS = 6
+SHARED, MOST_KEYS = 9, 60  # tracks that three keyframes in a row should share; keyframes, to share them
 TESTED = 5  # other keyframes a hypothesis is tried on
 FEWEST_POINTS = 5  # seen by a camera that is found from them
 BUNDLES = (2, 4, 8, 16, 24, 36, 54, 81, 120, 180, 270)  # numbers of keyframes at which all is adjusted
@@ -36,7 +37,8 @@ def rays(observations: Observations, lens: Array, frames: int, tracks: int) -> A
 
 
 def keyframes(observations: Observations, frames: int, tracks: int, most: int = 20, least: int = 8) -> list[int]:
-    """Frames at equal steps of the cumulative median motion of the tracks."""
+    """Frames at equal steps of the cumulative median motion of the tracks, so many that three in a row share enough of
+    them: where tracks are short each camera is found from what the two before it tell."""
     table = np.full((frames, tracks, 2), np.nan)
     table[observations.frame, observations.track] = observations.xy
     step = np.zeros(frames)
@@ -45,9 +47,15 @@ def keyframes(observations: Observations, frames: int, tracks: int, most: int = 
         motion = motion[np.isfinite(motion)]
         step[k] = max(1e-3, float(np.median(motion))) if len(motion) else 1e-3
     path = np.cumsum(step)
+    seen = np.isfinite(table[:, :, 0])
     count = min(frames, max(least, min(most, frames // 5)))
-    at = np.searchsorted(path, np.linspace(path[0], path[-1], count))
-    return sorted({int(k) for k in np.clip(at, 0, frames - 1)})
+    while True:
+        at = np.searchsorted(path, np.linspace(path[0], path[-1], count))
+        keys = sorted({int(k) for k in np.clip(at, 0, frames - 1)})
+        of_three = seen[keys[:-2]] & seen[keys[1:-1]] & seen[keys[2:]]
+        if count >= min(frames, MOST_KEYS) or (of_three.sum(axis=1) >= SHARED).all():
+            return keys
+        count = min(frames, MOST_KEYS, count + count // 2 + 1)
 
 
 def best_pairs(table: Array, noise: float) -> list[Pair]:

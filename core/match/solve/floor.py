@@ -14,11 +14,11 @@ WINDOW = 3
 FEWEST = 10  # tracks of a window
 SHARE = 0.6  # of the tracks that the flat piece is laid through, the nearest to it
 ROUNDS = 6
-FALLBACK = 0.5  # pixels, where too few tracks are seen together
 
 
-def noise_floor(observations: Observations, frames: int) -> float:
-    """Standard deviation of an axis in pixels, robust against tracks that slide; `FALLBACK` when it cannot be told."""
+def noise_floor(observations: Observations, frames: int) -> float | None:
+    """Standard deviation of an axis in pixels, robust against tracks that slide; None where too few are seen together.
+    """
     tracks = int(observations.track.max(initial=-1)) + 1
     table = np.full((frames, tracks, 2), np.nan)
     table[observations.frame, observations.track] = observations.xy
@@ -29,7 +29,7 @@ def noise_floor(observations: Observations, frames: int) -> float:
         rows = np.concatenate([part[:, seen, 0], part[:, seen, 1]])
         if rows.shape[1] >= FEWEST:
             found.append(_variance(rows))
-    return float(np.sqrt(np.median(found))) if found else FALLBACK
+    return float(np.sqrt(np.median(found))) if found else None
 
 
 def _variance(rows: Array) -> float:

@@ -13,7 +13,7 @@ from core.match.solve.nodal import BY_CHANCE, parallax
 from core.match.solve.solve import Solution
 from core.match.solve.state import FOCAL, FRAME_FOCAL, K1, LENS_NAMES, Array, Rows, residuals
 
-GAIN = 30.0  # of the squares over the variance: a fixed parameter is wrong
+GAIN = 14.0  # of the squares over the variance: a fixed parameter is wrong; one in a thousand solves by chance
 NOISE, TOO_NOISY = 1.3, 3.0  # residuals over the noise of the tracks: said; refused
 FOCAL_SIGMA = 0.03
 PATH, NO_PATH = 0.03, 0.3  # uncertainty of the path over its size
@@ -124,6 +124,10 @@ def _warnings(
     if noisy > NOISE:
         said.append(
             f"The tracks miss the camera by {noisy:.2f} times their own noise: something is not in the model.")
+    if not solution.noise_told and not solution.views.alone.all():
+        said.append(
+            "Fewer than ten tracks are seen together: that they fit says little, a wrong one among them may bend the "
+            "path unseen. Add tracks.")
     if out > OUT:
         said.append(f"{round(100 * out)} % of the tracks do not fit and were left out; do they move by themselves?")
     if path > PATH:

@@ -14,6 +14,7 @@ SURE = 30.0  # gain of two parameters in variances: one track in three million b
 MEDIAN = 1.386  # of the gain of two parameters where nothing slides
 FEWEST = 8  # observations of a track
 STEP = 1e-5  # of the depth
+NEAR = 1e-6  # of the median depth
 
 
 def drift_gains(state: State, observations: Observations, tracks: int, sigma: float) -> Array:
@@ -32,6 +33,7 @@ def drift_gains(state: State, observations: Observations, tracks: int, sigma: fl
     pace = away / np.maximum(span[observations.track], 1.0)
     points = state.points[observations.track]
     here, depth = projected(state, observations.frame, points)
+    ahead_of = depth > NEAR * np.median(np.abs(depth))
     step = STEP * np.maximum(np.abs(depth), 1e-9)
     slope = np.empty((len(frame), 2, 6))  # of the point, of the drift, and the residual itself
     for k, axis in enumerate(np.eye(3)):
@@ -40,6 +42,7 @@ def drift_gains(state: State, observations: Observations, tracks: int, sigma: fl
     for k, side in enumerate(np.eye(2)):
         slope[:, :, 3 + k] = whitened(observations, pace[:, None] * side)
     slope[:, :, 5] = residuals(state, observations)
+    slope[~ahead_of | ~np.isfinite(slope).all(axis=(1, 2))] = 0.0  # behind a camera nothing is told
     order = np.argsort(observations.track, kind="stable")
     first = np.flatnonzero(np.diff(observations.track[order], prepend=-1))
     sums = np.add.reduceat(np.matmul(slope.transpose(0, 2, 1), slope)[order], first, axis=0)

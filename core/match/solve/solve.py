@@ -44,6 +44,7 @@ OUTLIER = 4.5  # standard deviations
 PICKED = 1.0 / 2000.0  # of the width of a photograph: noise of what was seen in photographs alone
 WILD = 0.005  # of the width of the picture: noise no tracker makes
 TOGETHER = 2e-3  # of the width of the picture: tracks so near to each other are one place
+FLOOR = 0.5  # pixels: noise where too few tracks are seen together to tell it
 HYPOTHESES = 6
 RAMPS = (0.35, -0.35)  # of the logarithm of the focal length from the first frame to the last
 RAMPED = 0.9  # of the residuals: such a zoom or bend explains more
@@ -91,6 +92,7 @@ class Solution(NamedTuple):
     free : what was found; the rest was given. said : words for the artist.
     pixel : (F,) pixels of its own picture that one of the solve is in each frame; 1 but for photographs and witnesses.
     views : who took which frame. The observations are as the first camera would have them.
+    noise_told : whether the tracks told `noise`; too few seen together do not.
     """
 
     state: State
@@ -108,6 +110,7 @@ class Solution(NamedTuple):
     said: tuple[str, ...]
     pixel: Array
     views: Views
+    noise_told: bool = True
 
 
 def observations_of(tracks: Sequence[Track]) -> tuple[Observations, Rows]:
@@ -250,6 +253,11 @@ def _best(
     assert best is not None
     start, problem = best
     found = problem.finish(start)
+    if start.kind == "nodal" and not options.nodal and not views.alone.any() and _left_out(found) > LEFT_OUT:
+        moving = problem.begin(turning=False)
+        other_way = problem.finish(moving) if moving.doubt < np.inf else found
+        if _left_out(other_way) < 0.5 * _left_out(found):
+            found, start = other_way, moving
     missing = _left_out(found) > LEFT_OUT and correlation(found.state, found.observations.take(found.used)) > WANDERS
     doubtful = start.doubt > ACCEPT or missing
     if start.kind == "nodal" or not doubtful or views.alone.any() or len(views.cameras) > 1:
@@ -290,20 +298,21 @@ def _left_out(found: Solution) -> float:
 
 
 def _noise(observations: Observations, views: Views, size: tuple[int, int]) -> tuple[float, bool]:
-    """Standard deviation of an axis in pixels, and whether the tracks told it: photographs alone do not."""
+    """Standard deviation of an axis in pixels, and whether the tracks told it: photographs and few tracks do not."""
     shot = np.flatnonzero(~views.alone)
     if len(shot) < 3 and views.alone.any():
         return PICKED * max(size), False
     number = np.full(len(views.alone), -1, np.int32)
     number[shot] = np.arange(len(shot))
     part = observations.take(number[observations.frame] >= 0)
-    pixels = noise_floor(part._replace(frame=number[part.frame]), len(shot))
+    told = noise_floor(part._replace(frame=number[part.frame]), len(shot))
+    pixels = FLOOR if told is None else told
     if pixels > WILD * size[0]:
         raise UserError(
             f"The tracks jump about by {pixels:.0f} px from frame to frame as no camera moves points: they are not "
             "tracks of one rigid scene."
         )
-    return pixels, True
+    return pixels, told is not None
 
 
 def _check(observations: Observations, frames: Rows, tracks: int, views: Views) -> None:
@@ -374,6 +383,7 @@ class _Problem:
         self.frames, self.tracks, self.size, self.views = frames, tracks, size, views
         self.pixels, told = _noise(self.observations, views, size)
         self.noise = self.pixels * float(np.median(self.observations.root[:, 0]))
+        self.noise_told = told
         self.least = self.noise if told else 0.2 * self.noise  # photographs may be seen better than usual
         self.options, self.lens, self.progress = options, options.lens_at(focal, size), progress
         self.keys = self._keys()
@@ -407,11 +417,11 @@ class _Problem:
 
     # -- keyframes ----------------------------------------------------------------------------------------
 
-    def begin(self) -> _Start:
-        """The best explanation of the keyframes that starts at the focal length."""
+    def begin(self, *, turning: bool = True) -> _Start:
+        """The best explanation of the keyframes that starts at the focal length; `turning` may be one of them."""
         lens = self.lens
         free = self.options.focal is None or self.options.free_focal
-        nodal = None if self.views.alone.any() else self._nodal(lens, free)
+        nodal = self._nodal(lens, free) if turning and not self.views.alone.any() else None
         if nodal is not None and (nodal.doubt < NODAL_SURE or self.options.nodal):
             return nodal
         found = self._free(lens, free)
@@ -562,7 +572,7 @@ class _Problem:
         sigma = float(np.sqrt((final**2).sum() / max(1, freedom)))
         return Solution(
             state, self.frames, known, held, used, observations, start.kind, self.noise, sigma, tuple(self.keys),
-            self.size, free, start.said, self.pixel, self.views,
+            self.size, free, start.said, self.pixel, self.views, self.noise_told,
         )
 
     def _spread(self, state: State, observations: Observations, used: Flags) -> float:

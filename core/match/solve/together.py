@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.match.solve.floor import noise_floor
-from core.match.solve.solve import observations_of
+from core.match.solve.solve import FLOOR, observations_of
 from core.match.solve.state import Observations, Rows
 from core.match.solve.views import Camera, Views, one_shot
 from core.match.track import Track
@@ -61,13 +61,13 @@ def together(tracks: Sequence[Track], size: tuple[int, int], others: Sequence[Pi
     views = one_shot(len(frames), Camera(size))
     if not others:
         return Together(observations, frames, names, views, said)
-    noise = noise_floor(observations, len(frames)) * float(np.median(observations.root[:, 0]))
+    noise = _noise(observations, len(frames))
     parts, alone, cameras = [observations], [views.alone], [views.camera]
     for number, other in enumerate(others, 1):
         rows = _rows_of(names, other)
         seen, own = _evenly(*observations_of(other.tracks))
         if other.sigma is None:
-            root = seen.root * (noise / (noise_floor(seen, len(own)) * float(np.median(seen.root[:, 0]))))
+            root = seen.root * (noise / _noise(seen, len(own)))
         else:
             root = (noise / other.sigma[seen.track])[:, None] * [1.0, 0.0, 1.0]
         parts.append(Observations((seen.frame + len(said)).astype(np.int32), rows[seen.track], seen.xy, root))
@@ -81,6 +81,11 @@ def together(tracks: Sequence[Track], size: tuple[int, int], others: Sequence[Pi
         Views(np.concatenate(alone), np.concatenate(cameras), (Camera(size), *(other.camera for other in others))),
         said,
     )
+
+
+def _noise(observations: Observations, frames: int) -> float:
+    """Standard deviation of the whitened tracks."""
+    return (noise_floor(observations, frames) or FLOOR) * float(np.median(observations.root[:, 0]))
 
 
 def _rows_of(names: list[str], other: Pictures) -> Rows:
