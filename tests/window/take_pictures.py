@@ -52,10 +52,10 @@ def take(save: Callable[[str, QImage], object]) -> None:
     evaluator.close()
     hand = hand_at(document, SIZE, managed=False)
     desk = hand.window.desk
-    hand.window.commands.run("view.three_quarter")
-    hand.finish()
-    hand.window.commands.run("view.frame_all")
-    hand.finish()
+    desk.set_workspace(view=ViewOptions(guides=False).replace(**BARE))  # nothing is drawn that no picture shows
+    for command in ("view.three_quarter", "view.frame_all"):
+        hand.window.commands.run(command)
+        hand.rest()
     start = desk.workspace.cameras
     for name, options in OPTIONS.items():
         desk.set_workspace(view=ViewOptions(guides=False).replace(**options))
