@@ -7,27 +7,21 @@ number 0, whose size moderngl does not know: sizes are those of the window times
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import (
-    QColor,
     QCursor,
     QExposeEvent,
     QFocusEvent,
     QGuiApplication,
-    QImage,
     QKeyEvent,
     QMouseEvent,
     QNativeGestureEvent,
-    QPainter,
     QResizeEvent,
-    QSurfaceFormat,
     QTabletEvent,
     QWheelEvent,
 )
@@ -37,14 +31,16 @@ from PySide6.QtWidgets import QWidget
 from app.window.commands import Commands
 from app.window.desk import Desk
 from app.window.gestures import BrushDrag, Gestures
+from app.window.gl_surface import driver_of, no_gl, surface_format
 from app.window.hotkeys import Hotkeys
+from app.window.letters import letters
 from app.window.match.view import PlateView
 from app.window.navigation import CameraDrag, Eye
 from app.window.pose.overlay import skeleton_of
 from app.window.pose.views import PoseViews
-from app.window.stopwatch import Stopwatch
 from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
-from app.window.theme import look_of, text_font
+from app.window.theme import look_of
+from app.window.view_figures import ViewFigures
 from core.document import Document
 from core.errors import UserError
 from core.gate import gate_box, seen_through
@@ -52,7 +48,6 @@ from core.overlay import Overlays
 from core.workspace import Workspace
 from tools.tool import Pointer, Sight
 from viewport.gate import gate_marks
-from viewport.hud import Byte3
 from viewport.panes import corner_of, pane_at, size_of
 from viewport.view import TEXT_PIXELS, HudLine
 
@@ -60,9 +55,7 @@ if TYPE_CHECKING:
     from app.window.live_picture import LivePicture
     from viewport.live_scene import Done, Job
 
-NO_GL = "The view needs OpenGL 3.3, and this computer offers {found}. Install or update its graphics driver."
 CALM_MS = 120  # after the last movement, before the picture is finished
-HUD_EVERY = 0.25  # seconds between new figures in the corner
 
 
 class Viewport(QOpenGLWindow):
@@ -103,8 +96,7 @@ class Viewport(QOpenGLWindow):
         self._moved = False  # the picture being painted was drawn anew
         self._pointer: Pointer | None = None
         self._pen = False  # the pen is down: what the system makes of it as a mouse is no event of its own
-        self._draw_watch, self._dab_watch = Stopwatch(), Stopwatch()
-        self._hud: tuple[float, list[HudLine]] = (0.0, [])
+        self.figures = ViewFigures(desk)
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.timeout.connect(self._rest_a_little)
@@ -234,17 +226,18 @@ class Viewport(QOpenGLWindow):
 
         try:
             self._ctx = moderngl.create_context(require=330)
-        except Exception as error:  # glcontext raises bare Exceptions
-            self.failed.emit(NO_GL.format(found=_version(self.context(), error)))
+        except Exception:  # glcontext raises bare Exceptions
+            self.failed.emit(no_gl(self.context()))
             return
         self._ctx.gc_mode = "context_gc"
+        self.figures.driver = driver_of(self._ctx)
         self._screen = self._ctx.detect_framebuffer(0)
         try:
             self.picture = LivePicture(
                 self._ctx, self.desk.session, letters, self._start_job, self.redraw, self._budget_ms,
                 self.views.panes)
-        except Exception as error:  # a driver that promises 3.3 and fails at the first shader
-            self.failed.emit(NO_GL.format(found=_version(self.context(), error)))
+        except Exception:  # a driver that promises 3.3 and fails at the first shader
+            self.failed.emit(no_gl(self.context()))
 
     def paintGL(self) -> None:
         """One picture: drawn anew when something changed, else the one there is with the ring over it."""
@@ -260,7 +253,7 @@ class Viewport(QOpenGLWindow):
             return
         if drawing:
             self._stale = False
-            self._draw_watch.start()
+            self.figures.drawing.start()
             moving = self.desk.session.stroking or self.playing
             if picture.follow(self.eye.camera, self.pixels(), moving) or picture.shown < 0:
                 picture.draw()
@@ -279,7 +272,7 @@ class Viewport(QOpenGLWindow):
     def _swapped(self) -> None:
         if self._moved and self.picture is not None:
             self._moved = False
-            took = self._draw_watch.stop()
+            took = self.figures.drawing.stop()
             self.frames += 1
             if took is not None:
                 self.picture.density.frame(took)
@@ -313,7 +306,7 @@ class Viewport(QOpenGLWindow):
         if more:
             self._rest.start(0)
         elif picture.settled:
-            self._hud = (0.0, [])
+            self.figures.forget()
             self.repaint_soon()
             self.settled.emit()
 
@@ -342,26 +335,7 @@ class Viewport(QOpenGLWindow):
         return under + ring + gestures.overlays()
 
     def _hud_lines(self) -> list[HudLine]:
-        picture, now = self.picture, time.monotonic()
-        if picture is None or self._ctx is None:
-            return []
-        if now - self._hud[0] < HUD_EVERY and self._hud[1]:
-            return self._hud[1]
-        guides = sum(len(groom.guides) for groom in self.desk.document.grooms)
-        lines: list[HudLine] = []
-        if self.desk.document.grooms:
-            lines += [(self.desk.session.tool.label, "accent"), f"guides {guides:,}"]
-        if picture.total:
-            shown = picture.total if picture.settled else min(picture.shown, picture.total)
-            lines.append(f"hairs {picture.total:,}" if shown == picture.total else
-                         f"hairs {shown:,} of {picture.total:,}")
-        state = "finished" if picture.settled else "growing" if picture.growing else "refining"
-        dab = f"dab {self._dab_watch.ms:.0f} ms · " if self._dab_watch.ms else ""
-        lines.append(f"{dab}draw {self._draw_watch.ms:.0f} ms · {state}")
-        lines.append(f"{_short(self._ctx.info['GL_RENDERER'])} · GL {self._ctx.version_code / 100:.1f}")
-        lines += [(trouble, "trouble") for trouble in picture.troubles]
-        self._hud = (now, lines)
-        return lines
+        return [] if self.picture is None else self.figures.lines(self.picture)
 
     # -- what changes ------------------------------------------------------------------------------------
 
@@ -373,14 +347,14 @@ class Viewport(QOpenGLWindow):
         if any(getattr(old, name) is not getattr(new, name) for name in seen):
             self.redraw()
         else:
-            self._hud = (0.0, [])
+            self.figures.forget()
             self.repaint_soon()
 
     def _session_replaced(self) -> None:
         self.gestures.drag = None
         if self.picture is not None:
             self.picture.replace_session(self.desk.session)
-        self._hud = (0.0, [])
+        self.figures.forget()
         self.redraw()
 
     def _stroke_ended(self) -> None:
@@ -538,10 +512,10 @@ class Viewport(QOpenGLWindow):
     def _frame(self) -> None:
         stroking = self.gestures.stroke is not None
         if stroking:
-            self._dab_watch.start()
+            self.figures.dabbing.start()
         self.gestures.frame()
         if stroking:
-            self._dab_watch.stop()
+            self.figures.dabbing.stop()
 
     def _pinch(self, event: QNativeGestureEvent) -> bool:
         if event.gestureType() != Qt.NativeGestureType.ZoomNativeGesture or self.gestures.drag is not None:
@@ -565,48 +539,3 @@ class Viewport(QOpenGLWindow):
             return
         if not typing:
             self.requestActivate()
-
-
-def surface_format() -> QSurfaceFormat:
-    """OpenGL 3.3 core without samples: edges are smoothed at rest, which costs the hand nothing."""
-    wanted = QSurfaceFormat()
-    wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
-    wanted.setVersion(3, 3)
-    wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
-    wanted.setDepthBufferSize(0)
-    wanted.setStencilBufferSize(0)
-    wanted.setSamples(0)
-    wanted.setSwapInterval(0)
-    return wanted
-
-
-def letters(words: str, pixels: float, color: Byte3) -> NDArray[np.uint8]:
-    """Words in the window's own font: (H, W, 4) uint8, red green blue and opacity (see viewport.hud)."""
-    font = text_font(look_of(), max(round(pixels), 1))
-    probe = QImage(1, 1, QImage.Format.Format_RGBA8888)
-    painter = QPainter(probe)
-    painter.setFont(font)
-    width, height, rise = (
-        painter.fontMetrics().horizontalAdvance(words), painter.fontMetrics().height(), painter.fontMetrics().ascent())
-    painter.end()
-    image = QImage(max(width, 1) + 2, max(height, 1), QImage.Format.Format_RGBA8888_Premultiplied)
-    image.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(image)
-    painter.setFont(font)
-    painter.setPen(QColor(255, 255, 255))
-    painter.drawText(1, rise, words)
-    painter.end()
-    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine())
-    opacity = rows[:, 3 : 4 * image.width() : 4]
-    letters_of = np.empty((*opacity.shape, 4), np.uint8)
-    letters_of[..., :3], letters_of[..., 3] = color, opacity
-    return letters_of
-
-
-def _version(context: object, error: Exception) -> str:
-    found = context.format() if context is not None else None  # type: ignore[attr-defined]
-    return "none" if found is None else f"{found.majorVersion()}.{found.minorVersion()}"
-
-
-def _short(renderer: str) -> str:
-    return renderer.split(" (", maxsplit=1)[0].split("/", maxsplit=1)[0]
