@@ -55,7 +55,7 @@ from viewport.shaders import program, set_uniforms
 SLICE_MS = 14.0  # work is added to a slice until it has taken so long; the last piece may take as long again
 FULL_PART = 0.4  # of the refinement is done when all hairs are shown
 FINISHED_SAMPLES = 2
-COATED_PIXELS, COATED_OPACITY = 1.0, 0.24  # of plain guides over a coat
+COATED_PIXELS, COATED_OPACITY = 1.0, 0.13  # of plain guides over a coat: seen when looked for
 TEXT_PIXELS = 12.0
 HUD_MARGIN = 14.0
 

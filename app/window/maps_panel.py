@@ -30,7 +30,7 @@ from core.workspace import Workspace
 from tools.document_edits import add_flat_map, map_from_image, remove_map, set_coat, set_map
 from tools.map_edits import DENSITY, ROLES, paintable_copy, painted_name
 
-NONE = "none"
+NO_MAP = {"density_map": "none · even everywhere", "length_map": "none · as the guides are"}  # by role
 PAINT = "paint_map"  # the tool
 
 
@@ -201,7 +201,7 @@ class MapsPanel(QWidget):
                 self.list.updateGeometry()
             for role, box in self.roles.items():
                 box.clear()
-                box.addItems([NONE, *names])
+                box.addItems([NO_MAP[role], *names])
                 driver = None if groom is None else getattr(groom.coat, role)
                 box.setCurrentIndex(0 if driver is None else names.index(driver) + 1)
                 box.setEnabled(groom is not None)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QComboBox
+from PySide6.QtWidgets import QComboBox, QWidget
 
 from app.window.icons import paint_icon
 from app.window.theme import look_of
 
 
 class Combo(QComboBox):
-    """The style sheet leaves the arrow out, as Qt draws it with a bevel of its own."""
+    """The style sheet leaves the arrow out, as Qt draws it with a bevel of its own.
+
+    It is as wide as there is room; a long word is cut short in it rather than making a column of panels wider.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(6)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
