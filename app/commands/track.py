@@ -21,6 +21,7 @@ from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.mix import mixed
 from core.image.plate import ChannelMix
+from core.match.follow import with_found
 from core.match.outline import held_off
 from core.match.plane_tracker import plane_steps
 from core.match.track import MODELS, PlaneTrack, Track, TrackSettings
@@ -98,8 +99,13 @@ def command(
                     telling.words(f"tracking, frame {step.frame}: {len(step.tracks)} tracks")
                 seconds = time.perf_counter() - begin
                 pins = tuple(_followed(plane, read, span, settings, workers, hold, telling) for plane in flat)
-                made = tracking.tracks()
+                was = {track.id: track for track in keyed}
+                made = tuple(
+                    with_found(was[track.id], track, span) if track.id in was else track for track in tracking.tracks())
             warnings += _film_warnings(film.missing, source.broken, span)
+            found = len(made) - len(keyed)
+            if found < auto:
+                warnings.append(f"{found} of {auto} features were found and followed; the plate shows no more corners that are sure")
             warnings += _track_warnings(made, span) + [
                 f"plane {plane.name} is seen on {len(plane.frames)} of {len(span)} frames"
                 for plane in pins if len(plane.frames) < len(span)]
@@ -130,7 +136,7 @@ def command(
     result = {
         "plate": film.name, "size": [film.width, film.height], "frames": [span[0], span[-1]], "tracks": len(made), "planes": len(pins),
         "observations": sum(len(track.frames) for track in made), "seconds": telling.seconds,
-        "ms_per_track_frame": round(1e3 * seconds / max(1, tracking.observations), 4), "warnings": warnings, "outputs": written,
+        "ms_per_track_frame": round(1e3 * seconds / tracking.observations, 4) if tracking.observations else 0.0, "warnings": warnings, "outputs": written,
         "peak_mb": peak_megabytes(),
     }
     if done is not None:
@@ -206,5 +212,5 @@ def _track_warnings(tracks: tuple[Track, ...], span: range) -> list[str]:
                 words.append(f"track {track.name} ends at frame {track.frames[-1]}")
             gaps = int(track.frames[-1] - track.frames[0] + 1 - len(track.frames))
             if gaps:
-                words.append(f"track {track.name} is out of sight on {gaps} frames")
+                words.append(f"track {track.name} is out of sight on {gaps} frame{'s' if gaps > 1 else ''}")
     return words

@@ -77,7 +77,10 @@ class Tracking:
 
     def tracks(self) -> tuple[Track, ...]:
         """What has been tracked so far. Features that were never seen again are no tracks."""
-        made = [join_pieces(track, self._pieces[track.id]) for track in self._given]
+        made = [
+            join_pieces(track, self._pieces[track.id]) if _keyed_on(track, self._frames) else track
+            for track in self._given
+        ]
         return tuple(track for track in made if len(track.frames) > 1 or track.id not in self._features)
 
     def _sweep(self, direction: int) -> Iterator[Step]:
@@ -125,6 +128,8 @@ class Tracking:
         """The keys to follow, by frame: to the next key of their track, or to the end of the plate."""
         starts: dict[int, list[Start]] = {}
         for track in self._given:
+            if not _keyed_on(track, self._frames):
+                continue
             keys = [key for key in track.keys[::direction] if int(key[0]) in self._frames]
             ends = [int(key[0]) for key in keys[1:]] + [self._frames[::direction][-1]]
             for (frame, x, y), end in zip(keys, ends, strict=True):
@@ -187,6 +192,11 @@ def _told(frame: int, done: int, total: int, seen: list[tuple[list[int], Seen]])
         np.concatenate([getattr(one, name) for _, one in seen]) for name in ("points", "covariance", "score")
     )
     return Step(frame, done, total, ids, points, covariance, score)
+
+
+def _keyed_on(track: Track, frames: range) -> bool:
+    """Whether a track has a key to be followed from; without one it stays as it is."""
+    return any(int(frame) in frames for frame in track.keys[:, 0])
 
 
 def _nothing_held(frame: int) -> Mask | None:

@@ -58,6 +58,26 @@ def test_keys_are_followed_in_the_numbers_of_the_files(plate, tmp_path):
     assert 'src="http' not in text
 
 
+def test_a_part_of_the_plate_is_tracked_and_the_rest_stays(plate, tmp_path):
+    keys, out = tmp_path / "in.json", tmp_path / "out.json"
+    old = [1001, *POINT, 0.01, 0.0, 0.01, 0.5]
+    given = [
+        {"name": "first", "keys": [1003], "points": [old, [1003, *place(POINT, 2)]]},
+        {"name": "away", "points": [[1001, *POINT]]},
+    ]
+    keys.write_text(json.dumps({"tracks": given}))
+    arguments = ("--tracks", keys, "--frames", "1003-1004", "--tracks-out", out, "--auto", "900", "--json")
+    code, words, error = filoplume("track", plate, *arguments)
+    assert code == 0, error
+    first, away = json.loads(out.read_text())["tracks"][:2]
+    assert [p[0] for p in first["points"]] == [1001, 1003, 1004]
+    assert first["points"][0][1:] == pytest.approx(old[1:])
+    assert [p[0] for p in away["points"]] == [1001]
+    warnings = json.loads(words)["warnings"]
+    assert any("away" in w and "left as it was" in w for w in warnings)
+    assert any("of 900 features" in w for w in warnings)
+
+
 def test_features_are_found_by_themselves_and_masks_hold_them_off(plate, tmp_path):
     masks, out = tmp_path / "masks.json", tmp_path / "out.json"
     left = [[-1, -1], [80, -1], [80, 130], [-1, 130]]

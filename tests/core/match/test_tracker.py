@@ -206,3 +206,10 @@ def test_motion_blur_is_followed():
         truth = np.array([place(POINTS[4], 4 * k) for k in track.frames])
         assert len(track.frames) == 8
         assert np.abs(track.points - truth).max() < 0.1
+
+
+def test_a_track_with_no_key_on_these_frames_stays_as_it_was_and_the_others_are_followed():
+    elsewhere = keyed_track(9, "elsewhere", np.array([[50, 45.0, 40.0], [60, 50.0, 41.0]]))
+    followed_one, left = followed(range(3), (*keyed(POINTS[:1]), elsewhere), frame)
+    assert list(followed_one.frames) == [0, 1, 2]
+    assert left is elsewhere
