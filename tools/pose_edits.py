@@ -222,6 +222,8 @@ def set_falloff(document: Document, mesh_id: int, name: str, control: str, fallo
     """The document with the reach of a pose along a control: radians, metres or units; as all others when None."""
     at, k = _place(document, mesh_id, name)
     space = _correctives(document, mesh_id).layers[at].space
+    if falloff is not None and control not in space.controls:
+        raise UserError(f"The layer of {name!r} does not read {control!r}; it reads {', '.join(space.controls)}.")
     own = {c: f for c, f in space.samples[k].falloffs.items() if c != control}
     sample = space.samples[k].replace(falloffs=own if falloff is None else {**own, control: falloff})
     changed = with_rest_falloffs(space.replace(samples=(*space.samples[:k], sample, *space.samples[k + 1 :])))
