@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from core.document import Document, MeshObject, find_groom, find_mesh
+from core.document import Document, MeshObject
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.formats.arrays import ArrayHashes
@@ -139,22 +139,27 @@ class Session:
 
     @property
     def mesh(self) -> MeshObject:
-        """The mesh that the pose craft works on; UserError when there is none with a rig."""
+        """The mesh that the pose craft works on: the first with a rig where none is chosen or the chosen one is gone.
+
+        UserError when there is none with a rig.
+        """
         document, wanted = self.history.current, self.workspace.mesh
-        if wanted is not None:
-            return find_mesh(document, wanted)
-        found = next((item for item in document.meshes if item.rig is not None), None)
+        found = next((item for item in document.meshes if item.id == wanted), None) or next(
+            (item for item in document.meshes if item.rig is not None), None)
         if found is None:
             raise UserError("There is no mesh with a rig to pose; import one with a skeleton or blend shapes first.")
         return found
 
     @property
     def groom(self) -> Groom:
-        """The groom that tools and actions edit; UserError when there is none."""
-        document, wanted = self.history.current, self.workspace.groom
-        if not document.grooms:
+        """The groom that tools and actions edit: the first where none is chosen or undo took the chosen one away.
+
+        UserError when there is none.
+        """
+        grooms, wanted = self.history.current.grooms, self.workspace.groom
+        if not grooms:
             raise UserError("There is no groom to work on; open a mesh and add a groom to it first.")
-        return document.grooms[0] if wanted is None else find_groom(document, wanted)
+        return next((groom for groom in grooms if groom.id == wanted), grooms[0])
 
     def tool_named(self, name: str) -> Tool[Any]:
         """A tool with the parameters the workspace has for it."""

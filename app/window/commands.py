@@ -163,7 +163,7 @@ class Commands:
             if command.name in self._table:
                 raise ValueError(f"there are two commands {command.name}")
             self._table[command.name] = command
-            self._haystack.append((command.label.lower(), f"{command.category} {command.words}".lower()))
+            self._haystack.append((command.label.lower().rstrip("…"), f"{command.category} {command.words}".lower()))
 
     def reason(self, name: str) -> str | None:
         """Why the command cannot run now, or None when it can."""
@@ -195,7 +195,7 @@ class Commands:
             order = {name: place for place, name in enumerate(self.recent)}
             return sorted(commands, key=lambda c: order.get(c.name, len(order)))
         scores = [0.0] * len(commands)
-        for word in words.lower().split():
+        for word in words.lower().replace("…", "").split():
             for place, score in enumerate(_scores(word, self._haystack)):
                 scores[place] += score if score >= 70.0 else -200.0
         good = [(score, c) for score, c in zip(scores, commands, strict=True) if score > 0.0]

@@ -67,9 +67,7 @@ class Desk(QObject):
     def groom(self) -> Groom | None:
         """The groom that tools edit, or None."""
         grooms = self.document.grooms
-        wanted = self.workspace.groom
-        found = next((groom for groom in grooms if groom.id == wanted), None)
-        return found if found is not None or wanted is not None else (grooms[0] if grooms else None)
+        return next((groom for groom in grooms if groom.id == self.workspace.groom), grooms[0] if grooms else None)
 
     @property
     def posed(self) -> MeshObject | None:

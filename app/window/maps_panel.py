@@ -30,7 +30,7 @@ from core.workspace import Workspace
 from tools.document_edits import add_flat_map, map_from_image, remove_map, set_coat, set_map
 from tools.map_edits import DENSITY, ROLES, paintable_copy, painted_name
 
-NO_MAP = {"density_map": "none · even everywhere", "length_map": "none · as the guides are"}  # by role
+NO_MAP = {"density_map": "none · even", "length_map": "none · as guides"}  # by role
 PAINT = "paint_map"  # the tool
 
 

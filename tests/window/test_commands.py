@@ -276,6 +276,7 @@ def test_theme_and_text(host: Host) -> None:
     ("both sides", "tool.symmetry"), ("mirror", "groom.mirror"), ("bigger brush", "tool.larger"),
     ("hotkey", "window.keymap"), ("record", "macro.record"),
     ("prefrences", "window.preferences"), ("symetry", "tool.symmetry"), ("simetry", "tool.symmetry"),
+    ("plybalst", "file.playblast"), ("prefernces…", "window.preferences"),
     ("view top", "view.top"), ("pyth", "window.console"), ("comb", "tool.comb"),
 ])
 def test_words_find_their_command_first(host: Host, words: str, name: str) -> None:

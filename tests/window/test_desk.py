@@ -10,6 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from app.window.desk import Desk
 from tests.tools.scenes import document, pointers, sight
+from tools.document_edits import add_empty_groom
 from tools.session import Session
 
 
@@ -39,3 +40,16 @@ def test_what_a_stroke_picks_is_heard_once_and_another_stroke_says_nothing(desk:
     desk.session.hand.press(sight(), press)
     desk.end_stroke()
     assert len(heard) == 1
+
+
+def test_undo_of_the_groom_in_hand_goes_back_to_another(desk: Desk) -> None:
+    """What is shown, what is edited and what tools stand on stay one groom; redo comes back to the one chosen."""
+    first = desk.groom
+    assert first is not None
+    assert desk.edit("Add groom", add_empty_groom, desk.document.meshes[0].id)
+    desk.set_workspace(groom=desk.document.grooms[-1].id)
+    desk.session.undo()
+    assert desk.groom is first
+    assert desk.session.groom is first
+    desk.session.redo()
+    assert desk.groom is desk.session.groom is desk.document.grooms[-1]

@@ -72,7 +72,7 @@ def test_an_image_is_loaded_assigned_and_taken_back(
     pick(panel.roles["length_map"], qtbot, "Streifen 猫")
     assert desk.document.grooms[0].coat.length_map == "Streifen 猫"
     assert panel.described("Streifen 猫") == "16 × 16 · length"
-    pick(panel.roles["density_map"], qtbot, "none · even everywhere")
+    pick(panel.roles["density_map"], qtbot, "none · even")
     assert desk.document.grooms[0].coat.density_map is None
     assert desk.session.history.names[-3:] == ("Load map", "Length map", "Density map")
     for _ in range(3):

@@ -155,6 +155,7 @@ class Opening(QObject):
 
     def read_as(self, these: Sequence[Assumed], unit: str | None = None, turn: bool = False) -> None:
         """Read meshes that came in again, in place of themselves: in another unit, or with their other axis up."""
+        what = these[0].path.name if len(these) == 1 else f"{len(these)} meshes"
 
         def work(progress: Progress, cancelled: Asked) -> list[MeshFile]:
             return [
@@ -172,10 +173,10 @@ class Opening(QObject):
 
             if self._desk.edit("Turn upright" if turn else "Read in another unit", put):
                 self.opened.emit()
+                self._desk.said.emit(f"{what} read again; undo brings back what was there.")
                 for (mesh_id, path, _), found in zip(these, read, strict=True):
                     self.assumed.emit(Assumed(mesh_id, path, found))
 
-        what = these[0].path.name if len(these) == 1 else f"{len(these)} meshes"
         self._desk.jobs.start(f"Read {what}", work, done)
 
     def _read_mesh(self, path: Path, then: Callable[[Path, MeshFile], int | None]) -> None:
