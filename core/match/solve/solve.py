@@ -259,7 +259,8 @@ def _best(
         if _left_out(other_way) < 0.5 * _left_out(found):
             found, start = other_way, moving
     missing = _left_out(found) > LEFT_OUT and correlation(found.state, found.observations.take(found.used)) > WANDERS
-    doubtful = start.doubt > ACCEPT or missing
+    unasked = start.zoom and not options.zoom  # the path of one focal length may have led it astray
+    doubtful = start.doubt > ACCEPT or missing or unasked
     if start.kind == "nodal" or not doubtful or views.alone.any() or len(views.cameras) > 1:
         return found
     if not (options.distortion or options.zoom):
@@ -282,6 +283,8 @@ def _best(
         return found
     said = "The focal length changes over the shot: it was solved with a zoom, which nobody asked for."
     zoomed = likely[1].finish(likely[0]._replace(said=() if options.zoom else (said,)))
+    if unasked and _left_out(zoomed) <= _left_out(found) and zoomed.sigma < found.sigma:
+        return zoomed
     return zoomed if _better(zoomed, found) else found
 
 
