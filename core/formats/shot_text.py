@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
 from core.formats.shot_film import FILM, film_of, shot_of_film
-from core.formats.tracks_text import nuke_curve
+from core.formats.tracks_nuke import nuke_curve
 from core.match.solve.shot import Shot, shot_from_up
 from core.match.solve.state import Array
 

@@ -6,18 +6,19 @@ from collections.abc import Callable
 from pathlib import Path
 
 from core.errors import UserError
+from core.formats import tracks_blender, tracks_nuke
 from core.formats import tracks_text as text
 from core.formats.tracks_json import LARGEST_FILE, Tracks, read_tracks_json, write_tracks_json
 from core.match.track import Track
 
 READERS: dict[str, Callable[[str, tuple[int, int], str], Tracks]] = {
     ".3de": text.read_3de, ".2dt": text.read_pftrack, ".boujou": text.read_boujou, ".syntheyes": text.read_syntheyes,
-    ".uv": text.read_uv,
-    ".nk": text.read_nuke,
+    ".uv": text.read_uv, ".nk": tracks_nuke.read_nuke, ".py": tracks_blender.read_blender,
 }  # fmt: skip
 WRITERS: dict[str, Callable[[tuple[Track, ...], tuple[int, int]], str]] = {
     ".3de": text.write_3de, ".txt": text.write_3de, ".2dt": text.write_pftrack, ".boujou": text.write_boujou,
-    ".syntheyes": text.write_syntheyes, ".uv": text.write_uv, ".nk": text.write_nuke, ".py": text.write_blender,
+    ".syntheyes": text.write_syntheyes, ".uv": text.write_uv, ".nk": tracks_nuke.write_nuke,
+    ".py": tracks_blender.write_blender,
 }  # fmt: skip
 SUFFIXES = (".json", *WRITERS)
 

@@ -1,15 +1,14 @@
 """2D tracks in the plain text of other programs.
 
-What they count: 3DEqualizer, Nuke's and PFTrack's pixels begin at the lower left corner of the picture with y up, so
-the middle of our pixel (x, y) is (x + 0.5, height - 0.5 - y); Boujou's begin at the top left corner, y down; SynthEyes
-gives parts of the picture from -1 to 1, y down; Blender's (from our script) and mmSolver's 0 to 1, y up.
+What they count: 3DEqualizer's and PFTrack's pixels begin at the lower left corner of the picture with y up, so the
+middle of our pixel (x, y) is (x + 0.5, height - 0.5 - y); Boujou's begin at the top left corner, y down; SynthEyes
+gives parts of the picture from -1 to 1, y down; mmSolver's 0 to 1, y up. A name that comes twice gets a number.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -22,7 +21,6 @@ from core.match.track import Track, keyed_track
 
 Rows = dict[str, list[tuple[float, float, float]]]  # name -> frame, x, y
 Size = tuple[int, int]
-NUKE_TRACK = re.compile(r"(track\d+) \{\{curve ([^{}]*)\} \{curve ([^{}]*)\}\}")
 
 
 def corner_up(points: NDArray[np.float64], size: Size) -> NDArray[np.float64]:
@@ -30,7 +28,7 @@ def corner_up(points: NDArray[np.float64], size: Size) -> NDArray[np.float64]:
     return np.stack((points[:, 0] + 0.5, size[1] - 0.5 - points[:, 1]), axis=1)
 
 
-def _ours_from_corner_up(x: float, y: float, size: Size) -> tuple[float, float]:
+def ours_from_corner_up(x: float, y: float, size: Size) -> tuple[float, float]:
     return x - 0.5, size[1] - 0.5 - y
 
 
@@ -38,7 +36,7 @@ def _ours_from_corner_down(x: float, y: float, size: Size) -> tuple[float, float
     return x - 0.5, y - 0.5
 
 
-def _ours_from_unit_up(x: float, y: float, size: Size) -> tuple[float, float]:
+def ours_from_unit_up(x: float, y: float, size: Size) -> tuple[float, float]:
     return x * size[0] - 0.5, (1.0 - y) * size[1] - 0.5
 
 
@@ -70,9 +68,9 @@ def read_3de(text: str, size: Size, name: str) -> Tracks:
     for _ in range(_whole(lines, 0, name, MOST_TRACKS)):
         word = _line(lines, at, name)
         count = _whole(lines, at + 2, name, len(lines))
-        rows[_free(word, rows)] = [_numbers(_line(lines, at + 3 + k, name), name) for k in range(count)]
+        rows[free_name(word, rows)] = [_numbers(_line(lines, at + 3 + k, name), name) for k in range(count)]
         at += 3 + count
-    return tracks_of(rows, size, name, _ours_from_corner_up)
+    return tracks_of(rows, size, name, ours_from_corner_up)
 
 
 def write_3de(tracks: tuple[Track, ...], size: Size) -> str:
@@ -116,9 +114,9 @@ def read_pftrack(text: str, size: Size, name: str) -> Tracks:
         skip = 1 if len(lines[at + 1 : at + 3]) == 2 and len(lines[at + 2].split()) == 1 else 0
         count = _whole(lines, at + 1 + skip, name, len(lines))
         points = [_line(lines, at + 2 + skip + k, name) for k in range(count)]
-        rows[_free(word, rows)] = [_numbers(" ".join(line.split()[:3]), name) for line in points]
+        rows[free_name(word, rows)] = [_numbers(" ".join(line.split()[:3]), name) for line in points]
         at += 2 + skip + count
-    return tracks_of(rows, size, name, _ours_from_corner_up)
+    return tracks_of(rows, size, name, ours_from_corner_up)
 
 
 def write_pftrack(tracks: tuple[Track, ...], size: Size) -> str:
@@ -157,10 +155,10 @@ def read_uv(text: str, size: Size, name: str) -> Tracks:
         rows: Rows = {}
         for point in found["points"]:
             per_frame = [(float(p["frame"]), float(p["pos"][0]), float(p["pos"][1])) for p in point["per_frame"]]
-            rows[_free(str(point["name"]), rows)] = per_frame
+            rows[free_name(str(point["name"]), rows)] = per_frame
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise UserError(f"{name} is no .uv file of mmSolver ({type(error).__name__}).") from None
-    return tracks_of(rows, size, name, _ours_from_unit_up)
+    return tracks_of(rows, size, name, ours_from_unit_up)
 
 
 def write_uv(tracks: tuple[Track, ...], size: Size) -> str:
@@ -175,79 +173,6 @@ def write_uv(tracks: tuple[Track, ...], size: Size) -> str:
         ]
         points.append({"name": track.name, "id": track.id, "set_name": "", "per_frame": per_frame, "3d": None})
     return json.dumps({"version": 4, "num_points": len(points), "is_undistorted": False, "points": points})
-
-
-def read_nuke(text: str, size: Size, name: str) -> Tracks:
-    """Nuke: the curves of the knobs track1 to track4 of every Tracker3 node."""
-    rows: Rows = {}
-    for label, x, y in NUKE_TRACK.findall(text):
-        curves = [nuke_curve(words, name) for words in (x, y)]
-        both = sorted(curves[0].keys() & curves[1].keys())
-        rows[_free(label, rows)] = [(frame, curves[0][frame], curves[1][frame]) for frame in both]
-    return tracks_of(rows, size, name, _ours_from_corner_up)
-
-
-def write_nuke(tracks: tuple[Track, ...], size: Size) -> str:
-    """Nuke: Tracker3 nodes of four tracks each."""
-    nodes = []
-    for first in range(0, len(tracks), 4):
-        knobs = []
-        for number, track in enumerate(tracks[first : first + 4], 1):
-            points = corner_up(track.points, size)
-            curves = [
-                "{curve " + " ".join(f"x{f} {v:.6f}" for f, v in zip(track.frames, points[:, c], strict=True)) + "}"
-                for c in range(2)
-            ]
-            knobs += [f" enable{number} true", f" track{number} {{{curves[0]} {curves[1]}}}"]
-        names = ", ".join(re.sub(r"[^\w .-]", "_", track.name) for track in tracks[first : first + 4])
-        nodes.append("Tracker3 {\n" + "\n".join(knobs) + f'\n name Tracker{first // 4 + 1}\n label "{names}"\n}}\n')
-    return "".join(nodes)
-
-
-def nuke_curve(words: str, name: str) -> dict[float, float]:
-    """A curve of Nuke: x and a number set the frame, every value counts it on by one."""
-    values: dict[float, float] = {}
-    frame = 1.0
-    for word in words.split():
-        jump = word.startswith("x")
-        try:
-            number = float(word[1:] if jump else word)
-        except ValueError:
-            if word[:1].isalpha():  # interpolation, slopes: nothing that moves a key
-                continue
-            raise UserError(f"{name}: {word[:40]!r} stands in a curve.") from None
-        if jump:
-            frame = number
-        else:
-            values[frame] = number
-            frame += 1.0
-    return values
-
-
-def write_blender(tracks: tuple[Track, ...], size: Size) -> str:
-    """A script for Blender's text editor: markers in the active clip, or the first one."""
-    rows = []
-    for track in tracks:
-        points = corner_up(track.points, size) / size
-        rows.append(
-            [
-                track.name,
-                [
-                    [int(f), round(float(x), 9), round(float(y), 9)]
-                    for f, (x, y) in zip(track.frames, points, strict=True)
-                ],
-            ]
-        )
-    return f"""import bpy
-import json
-
-clip = getattr(bpy.context.space_data, "clip", None) or bpy.data.movieclips[0]
-tracks = clip.tracking.objects[0].tracks
-for name, points in json.loads({json.dumps(json.dumps(rows))}):
-    track = tracks.new(name=name, frame=points[0][0])
-    for frame, x, y in points:
-        track.markers.insert_frame(frame, co=(x, y))
-"""
 
 
 def _line(lines: list[str], at: int, name: str) -> str:
@@ -273,7 +198,7 @@ def _numbers(line: str, name: str) -> tuple[float, float, float]:
     return frame, x, y
 
 
-def _free(word: str, rows: Rows) -> str:
+def free_name(word: str, rows: Rows) -> str:
     name, number = word or "track", 2
     while name in rows:
         name, number = f"{word}_{number}", number + 1

@@ -21,7 +21,8 @@ def test_every_format_goes_there_and_back(tmp_path, suffix):
     write_tracks(path, TRACKS, suffix)
     found = read_tracks(path, SIZE)
     assert len(found.tracks) == 2
-    for track, keys in zip(found.tracks, KEYS, strict=True):
+    for number, (track, keys) in enumerate(zip(found.tracks, KEYS, strict=True)):
+        assert track.name == f"t{number}"
         np.testing.assert_array_equal(track.frames, keys[:, 0])
         np.testing.assert_allclose(track.points, keys[:, 1:], atol=2e-5)
 
@@ -34,6 +35,7 @@ SAMPLES = {
     ".syntheyes": f"p 7 {1 / 1920 - 1} {1 - 1 / 1080} 7\n",
     ".uv": json.dumps({"points": [{"name": "p", "per_frame": [{"frame": 7, "pos": [0.5 / 1920, 0.5 / 1080]}]}]}),
     ".nk": "Tracker3 {\n track1 {{curve x7 0.5} {curve x7 0.5}}\n}\n",
+    ".py": f'for name, points in json.loads("[[\\"p\\", [[7, {0.5 / 1920}, {0.5 / 1080}]]]]"):\n    pass\n',
 }
 
 
@@ -43,6 +45,30 @@ def test_pixels_are_counted_as_the_program_counts(tmp_path, suffix):
     path.write_text(SAMPLES[suffix])
     (track,) = read_tracks(path, SIZE).tracks
     np.testing.assert_allclose(track.keys, [[7, 0.0, 1079.0]], atol=1e-6)
+
+
+def test_the_table_of_nukes_tracker_is_read_with_its_names(tmp_path):
+    path = tmp_path / "a.nk"
+    path.write_text("""Read { file "a.mov" }
+Tracker4 {
+ inputs 0
+ tracks { { 1 31 3 }
+{ { 5 1 20 enable e 1 }
+{ 3 1 75 name name 1 }
+{ 2 1 58 track_x track_x 1 } }
+{
+ { {curve K x1 1} "left eye" {curve x7 0.5 x8 1.5 2.5} {curve i x7 0.5 x8 0.5 1.5} {curve K x1 0} {curve K x1 0} 1 0 0 }
+ { {1} nose {curve x9 100.5} {curve x9 1079.5} {} {} 1 0 0 }
+ { {curve K x1 1} "track 3" {} {} {} {} 1 0 0 }
+}
+}
+ name Tracker1
+}
+""")
+    eye, nose = read_tracks(path, SIZE).tracks
+    assert (eye.name, nose.name) == ("left eye", "nose")
+    np.testing.assert_allclose(eye.keys, [[7, 0, 1079], [8, 1, 1079], [9, 2, 1078]])
+    np.testing.assert_allclose(nose.keys, [[9, 100, 0]])
 
 
 @pytest.mark.parametrize("suffix", [".json", ".txt", *READERS])
