@@ -40,6 +40,7 @@ WORSE = 1.15  # of the noise: something of the lens may be missing
 GAIN = 0.93  # of the median residual: a richer lens is worth its parameters
 MEDIAN = 1.1774  # median of the length of a normal vector in the plane
 FOCALS = (0.7, 1.0, 1.6, 2.8)  # of the width of the picture, where nobody knows
+AROUND = (1.0, 0.8, 1.25)  # of the focal length given, where it is to be found: a fast pan leads a search astray
 OUTLIER = 4.5  # standard deviations
 PICKED = 1.0 / 2000.0  # of the width of a photograph: noise of what was seen in photographs alone
 WILD = 0.005  # of the width of the picture: noise no tracker makes
@@ -167,7 +168,9 @@ def solve(
         views = views._replace(bend=options.lens_at(options.focal or float(size[0]), size))
     check(views)
     _check(observations, frames, tracks, views)
-    if options.focal is not None or options.nodal:
+    if options.focal is not None and options.free_focal and not options.nodal:
+        guesses = [share * options.focal for share in AROUND]
+    elif options.focal is not None or options.nodal:
         guesses = [options.focal or float(size[0])]
     else:
         guesses = [share * max(size) for share in FOCALS]
