@@ -36,6 +36,7 @@ from core.match.track import HAND, Track
 LEAST_TRACKS, LEAST_PICKS = 8, 6  # of a shot; of photographs
 NODAL_SURE, NODAL_MAYBE = 1.3, 3.0  # median residual over the noise: a turning camera explains it; it may
 ACCEPT = 1.25  # of the noise: the keyframes are explained
+ASTRAY = 1.1  # of the noise, of all frames: there may be a better path
 WORSE = 1.15  # of the noise: something of the lens may be missing
 GAIN = 0.93  # of the median residual: a richer lens is worth its parameters
 MEDIAN = 1.1774  # median of the length of a normal vector in the plane
@@ -262,7 +263,8 @@ def _best(
         if _left_out(other_way) < 0.5 * _left_out(found):
             found, start = other_way, moving
     missing = _left_out(found) > LEFT_OUT and correlation(found.state, found.observations.take(found.used)) > WANDERS
-    unasked = start.zoom and not options.zoom  # the path of one focal length may have led it astray
+    # a zoom nobody asked for begins on the path of one focal length, which may have led it astray
+    unasked = start.zoom and not options.zoom and found.sigma > ASTRAY * found.noise
     doubtful = start.doubt > ACCEPT or missing or unasked
     if start.kind == "nodal" or not doubtful or views.alone.any() or len(views.cameras) > 1:
         return found
