@@ -325,11 +325,14 @@ def _resampled(layer: PoseLayer, samples: tuple[PoseSample, ...], sources: Seque
         return out
 
     moved = rows(layer.moved)
-    used = np.ones(moved.shape[1], np.bool_) if None in sources else moved.any(axis=0)
+    vertices, after, deltas, targets = layer.vertices, layer.after, rows(layer.deltas), rows(layer.targets)
+    if None not in sources:
+        used = np.flatnonzero(moved.any(axis=0))
+        vertices, after = vertices[used], after[used]
+        moved, deltas, targets = (array.take(used, axis=1) for array in (moved, deltas, targets))
     changed: PoseLayer = layer.replace(
-        space=layer.space.replace(samples=samples), vertices=freeze(layer.vertices[used]), moved=freeze(moved[:, used]),
-        after=freeze(layer.after[used]), deltas=freeze(rows(layer.deltas)[:, used]),
-        targets=freeze(rows(layer.targets)[:, used]))
+        space=layer.space.replace(samples=samples), vertices=freeze(vertices), moved=freeze(moved),
+        after=freeze(after), deltas=freeze(deltas), targets=freeze(targets))
     return changed
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,8 @@ def embed(dofs: Sequence[Dof], poses: Sequence[Pose]) -> Array:
     out = np.empty((len(poses), sum(WIDTHS[d.kind] for d in dofs)))
     turning = [d for d in dofs if d.kind in ("swing", "twist", "swing-twist")]
     if turning:
-        q = np.array([[pose.rotations.get(d.control, _REST_TURN) for d in turning] for pose in poses], np.float64)
+        parts = (pose.rotations.get(d.control, _REST_TURN) for pose in poses for d in turning)
+        q = np.fromiter(chain.from_iterable(parts), np.float64, 4 * len(poses) * len(turning))
         frames = np.array([_frame(d.axis, d.side) for d in turning], np.float64)
         turned = swung_and_twisted(q.reshape(len(poses), len(turning), 4), frames)
     at = turn = 0

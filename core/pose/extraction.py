@@ -40,12 +40,11 @@ def skin_affine(rig: Rig, matrices: Array, vertices: NDArray[np.int32]) -> Affin
         return Affine(np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.zeros(n, np.int64))
     strongest = np.take_along_axis(joints, weights.argmax(axis=1)[:, None], axis=1)[:, 0].astype(np.int64)
     if rig.skinning == "linear":
-        turn, move = np.zeros((n, 3, 3)), np.zeros((n, 3))
+        rows = np.hstack([matrices[:, :3, :3].reshape(-1, 9), matrices[:, :3, 3]])
+        total = np.zeros((n, 12))
         for k in range(joints.shape[1]):
-            share = weights[:, k].astype(np.float64)
-            turn += share[:, None, None] * matrices[joints[:, k], :3, :3]
-            move += share[:, None] * matrices[joints[:, k], :3, 3]
-        return Affine(turn, move, strongest)
+            total += weights[:, k, None] * rows.take(joints[:, k], axis=0)
+        return Affine(total[:, :9].reshape(n, 3, 3), total[:, 9:], strongest)
     move, x, y, z = (
         carried(np.tile(np.float32(p), (n, 1)), rig, matrices, vertices=vertices).astype(np.float64)
         for p in np.vstack([np.zeros(3), np.eye(3)])

@@ -181,15 +181,15 @@ def extract_layer(
     finite = np.isfinite(targets)
     given = finite[..., 0] & finite[..., 1] & finite[..., 2]
     sampled = np.zeros(given.shape, np.bool_) if moved is None else moved & given
-    surfaces = np.where(given[..., None], targets, 0.0).astype(np.float64)
+    surfaces = np.where(given[..., None], targets, targets.dtype.type(0))
     states = {k: state_at(points, rig, below, poses[k], vertices) for k in new}
     for k, state in states.items():
         surfaces[k, ~given[k]] = state.posed[~given[k]]
-        sampled[k] |= np.linalg.norm(surfaces[k] - state.posed, axis=1) > least
+        sampled[k] |= given[k] & (np.linalg.norm(surfaces[k] - state.posed, axis=1) > least)
     rows = np.flatnonzero(sampled.any(axis=0))
-    vertices, sampled, surfaces = vertices[rows], sampled[:, rows], surfaces[:, rows]
+    vertices, sampled, surfaces = vertices[rows], _columns(sampled, rows), _columns(surfaces, rows)
     kept = like if like is not None and len(new) < count else None
-    deltas = np.zeros(surfaces.shape, np.float32) if kept is None else kept.deltas[:, rows].copy()
+    deltas = np.zeros(surfaces.shape, np.float32) if kept is None else kept.deltas.take(rows, axis=1)
     was_after = np.zeros(len(rows), np.bool_) if kept is None else kept.after[rows]
     condition = np.zeros(sampled.shape)
     for k, state in states.items():
@@ -216,12 +216,19 @@ def extract_layer(
     layer = PoseLayer(
         name=name, space=space, kind="pose-space" if like is None else like.kind,
         enabled=like is None or like.enabled,
-        vertices=freeze(vertices[order].astype(np.int32)), moved=freeze(known[:, order]),
-        after=freeze(flagged[order]), deltas=freeze(deltas[:, order].reshape(count, -1, 3)),
-        targets=freeze(surfaces[:, order].astype(np.float32).reshape(count, -1, 3)))
+        vertices=freeze(vertices[order].astype(np.int32)), moved=freeze(_columns(known, order)),
+        after=freeze(flagged[order]), deltas=freeze(_columns(deltas, order)),
+        targets=freeze(_columns(surfaces.astype(np.float32, copy=False), order)))
     report = LayerReport(
         name, tuple(p.name for p in poses), layer.vertices, condition[:, order].astype(np.float32), layer.after)
     return layer, report
+
+
+def _columns(array: NDArray[Any], rows: NDArray[np.intp]) -> NDArray[Any]:
+    """Of an array (M, n, ...) the columns `rows`; itself where these are all of them as they stand."""
+    if len(rows) == array.shape[1] and bool((rows[1:] > rows[:-1]).all()):
+        return array
+    return array.take(rows, axis=1)
 
 
 def diagonal(points: NDArray[np.float32]) -> float:
@@ -270,9 +277,9 @@ def hold(
     while not known.all():
         changed = False
         keys = run_keys(np.zeros(known.shape[1], np.bool_), known, shares)
-        _, which = np.unique(keys, axis=1, return_inverse=True) if known.shape[1] else (None, np.zeros(0, np.int64))
-        for group in range(int(which.max(initial=-1)) + 1):
-            rows = np.flatnonzero(which == group)
+        order = np.lexsort(keys[::-1])
+        starts = np.flatnonzero((np.diff(keys[:, order], axis=1) != 0).any(axis=0)) + 1
+        for rows in np.split(order, starts):
             mine = known[:, rows[0]].copy()
             if mine.all():
                 continue

@@ -167,26 +167,29 @@ def _scales_of_each(
 ) -> Array:
     """The scales (C, D) of all centres: rest, anchors, samples."""
     own = [*[space.rest_falloffs] * (1 + len(space.anchors)), *(s.falloffs for s in samples)]
-    return np.array([scales(space.dofs, o, weights) if o else usual for o in own])
+    each = np.tile(usual, (len(own), 1))
+    for row, falloffs in enumerate(own):
+        if falloffs:
+            each[row] = scales(space.dofs, falloffs, weights)
+    return each
 
 
 def _squared_distances(places: Array, centres: Array, each: Array) -> Array:
     """(N, C), each centre measuring with its own scales."""
-    out = np.empty((len(places), len(centres)))
-    p, c, e = (np.ascontiguousarray(a, np.float64) for a in (places, centres, each))
+    out = np.zeros((len(places), len(centres)))
+    p, c, e = (np.ascontiguousarray(a, np.float64) for a in (places, centres.T, each.T))
     _measure(p, c, e, out)
     return out
 
 
 @njit(void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1]), cache=True, nogil=True)
 def _measure(places: np.ndarray, centres: np.ndarray, each: np.ndarray, out: np.ndarray) -> None:
+    # centres and scales (D, C): many centres at a time
     for n in range(len(places)):
-        for c in range(len(centres)):
-            total = 0.0
-            for d in range(centres.shape[1]):
-                apart = (places[n, d] - centres[c, d]) * each[c, d]
-                total += apart * apart
-            out[n, c] = total
+        for d in range(len(centres)):
+            for c in range(centres.shape[1]):
+                apart = (places[n, d] - centres[d, c]) * each[d, c]
+                out[n, c] += apart * apart
 
 
 def _columns(places: Array, centres: Array, each: Array, phi: Callable[[Array], Array], plane: Plane | None) -> Array:
@@ -202,7 +205,7 @@ def _affine_columns(places: Array, plane: Plane) -> Array:
 def _system(matrix: Array, centres: Array, plane: Plane | None, smoothing: float) -> Array:
     count = len(matrix)
     if plane is None:
-        return matrix + smoothing * np.eye(count)
+        return matrix + smoothing * np.eye(count) if smoothing else matrix
     columns = _affine_columns(centres, plane)
     system = np.zeros((count + columns.shape[1],) * 2)
     system[:count, :count] = matrix + smoothing * np.eye(count)
