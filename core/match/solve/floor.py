@@ -16,12 +16,13 @@ import numpy as np
 from core.match.solve.state import Array, Observations
 
 WINDOW = 3
-MOST = 64  # windows
+MOST = 32  # windows
 FEWEST = 10  # tracks of a window
 SHARE = 0.6  # of the tracks that the model is laid through, the nearest to it
 ROUNDS = 6
 QUADRATIC = 6  # numbers of a quadratic of two coordinates
 MOST_OFF = 12.0  # of the median square: more than three standard deviations
+LITTLE = 1e-9 * np.eye(QUADRATIC)  # for tracks on one line
 CORRELATION = np.linspace(0.0, 0.95, 39)  # of noise from one frame to the next
 
 
@@ -82,7 +83,8 @@ def _steady_variance(part: Array) -> float:
     bend = part[0] - 2.0 * part[1] + part[2]
     good = np.ones(len(x), bool)
     for k in range(ROUNDS):
-        rest = bend - basis @ np.linalg.lstsq(basis[good], bend[good], rcond=None)[0]
+        near = basis[good]
+        rest = bend - basis @ np.linalg.solve(near.T @ near + LITTLE, near.T @ bend[good])
         square = (rest**2).sum(axis=1)
         if k == ROUNDS - 1:
             break
