@@ -7,8 +7,8 @@ subdivided only where it earns it: where the coarse spline explains the frames w
 search far without explaining them better. What not even the finest grid can follow, an edge of the motion, stays as
 the search found it.
 
-Every pixel has a covariance: from the normal equations around its vertex and how well the frames agree there, and
-from how far the search back from the second frame misses it.
+Every pixel has a covariance: from the normal equations around its vertex, from how far the search back from the second
+frame misses it, and from how much the frames still differ there.
 """
 
 from __future__ import annotations
@@ -35,9 +35,11 @@ MOST = np.float32(4.0)  # pixels in one step
 LEAST_GREY = 0.001  # of the range of grey: by so much the spline may explain worse than the search
 FAR, BETTER = 0.5, 0.9  # pixels off the search, and how little of its disagreement must then be left
 WINDOW = 7  # pixels: side of the neighbourhood two flows are compared over
-NOTHING = np.float32(0.003)  # of the covariance of a vertex alone: it tells where there is nothing to see
+NOTHING = np.float32(0.0003)  # of the covariance of a vertex alone: it tells where there is nothing to see
 LEAST_SHARE = 0.1  # of a cell that is subdivided
 NEAR, WIDE = 5, 31  # pixels: sides of the windows over which the searches are compared with the flow
+ALIKE, APART = 0.5, 10.0  # of what the searches miss: counted where the frames agree, and more by how they differ
+BANDS = 2  # of the normal equations, each summed by itself: the same sums however many threads there are
 
 
 class Flow(NamedTuple):
@@ -70,25 +72,27 @@ def flow_between(
     y, x = np.mgrid[0 : a.shape[0], 0 : a.shape[1]]
     places = np.stack((x, y), axis=2).astype(np.float32)
     left = _disagreement(a, b, start, places)
-    flow = fitted(start, LEVELS[0][0] * spacing)
+    flow = fitted(start, LEVELS[0][0] * spacing, ranges)
     covariance = np.zeros((*a.shape, 3), np.float32)
     torn = np.ones(a.shape, np.float32)  # where the grid of the level is needed
     for level, (times, sigma) in enumerate(LEVELS):
         step = times * spacing
         if level:
             torn = _torn(a, b, flow, start, left, places)
-            flow = flow + fitted(_soft(torn, 5) * (start - flow), step)
+            flow = flow + fitted(_soft(torn, 5) * (start - flow), step, ranges)
         active = (_onto(torn, step) > LEAST_SHARE * step * step).astype(np.float32)
         if not active.any() or (cancel is not None and cancel()):
             break
         ga, gb = (np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.float32) for image in (a, b))
         for _ in range(rounds):
             seen = _compared(ga, gb, flow, places)
-            flow = flow + _step(seen, step, active)
+            flow = flow + _step(seen, step, active, ranges)
         part = _soft(torn, 5) if level else np.ones((1, 1, 1), np.float32)
-        covariance = covariance + part * (_covariance(seen, step) - covariance)
+        covariance = covariance + part * (_covariance(seen, step, ranges) - covariance)
     flow = flow + _soft(_torn(a, b, flow, start, left, places), 3) * (start - flow)
-    return Flow(flow, NOTHING * covariance + _missed(flow, start, back, places))
+    apart = ALIKE + APART * _disagreement(a, b, flow, places)
+    backs = fitted(back, spacing, ranges), fitted(back, 2 * spacing, ranges)
+    return Flow(flow, NOTHING * covariance + apart[:, :, None] * _missed(flow, start, backs, places))
 
 
 def search_flow(first: Field, second: Field, ranges: Ranges = serial_ranges) -> tuple[Field, Field]:
@@ -103,8 +107,8 @@ def search_flow(first: Field, second: Field, ranges: Ranges = serial_ranges) -> 
             search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
             search.setFinestScale(0)
             search.setPatchStride((4, 5)[n])
-            search.setGradientDescentIterations((30, 12)[n])
-            search.setVariationalRefinementIterations((5, 2)[n])
+            search.setGradientDescentIterations(12)
+            search.setVariationalRefinementIterations((4, 2)[n])
             found[n] = np.asarray(search.calc(grey[n], grey[1 - n], found[n]), np.float32)
 
     ranges(2, call, 1)
@@ -140,14 +144,16 @@ def _soft(area: Field, side: int) -> Field:
     return np.asarray(cv2.blur(area, (side, side)), np.float32)[:, :, None]
 
 
-def _missed(flow: Field, start: Field, back: Field, places: Field) -> Field:
-    """Covariance (H, W, 3) of what the searches there and back say against the flow.
+def _missed(flow: Field, start: Field, backs: tuple[Field, Field], places: Field) -> Field:
+    """Covariance (H, W, 3) of what the searches say against the flow.
 
-    Close by every gap counts, its noise too; over a wide window noise is gone and a common lean is left.
+    backs : the search back, smoothed less and more. The smaller gap counts: noise makes the one large, an edge of the
+    motion the other. Of the search there only a common lean over a wide window does; its noise is no error of the flow.
     """
-    gap = flow + _warped(back, flow, places, cv2.INTER_LINEAR)
-    lean, off = (np.asarray(cv2.blur(field, (WIDE, WIDE)), np.float32) for field in (gap, flow - start))
-    return np.asarray(cv2.blur(_outer(gap), (NEAR, NEAR)) + _outer(lean) + _outer(off), np.float32)
+    fine, coarse = (flow + _warped(back, flow, places, cv2.INTER_LINEAR) for back in backs)
+    gap = np.where((cv2.magnitude(*cv2.split(fine)) < cv2.magnitude(*cv2.split(coarse)))[:, :, None], fine, coarse)
+    lean = np.asarray(cv2.blur(flow - start, (WIDE, WIDE)), np.float32)
+    return np.asarray(cv2.blur(_outer(gap), (NEAR, NEAR)) + _outer(lean), np.float32)
 
 
 def _outer(field: Field) -> Field:
@@ -155,16 +161,16 @@ def _outer(field: Field) -> Field:
     return np.stack((u * u, u * v, v * v), axis=2)
 
 
-def fitted(field: Field, step: int) -> Field:
+def fitted(field: Field, step: int, ranges: Ranges = serial_ranges) -> Field:
     """The smooth spline near a field (H, W, 2): averaged onto the grid with its own weights, corrected thrice."""
     shape = field.shape[:2]
     weight = np.maximum(_onto(np.ones(shape, np.float32), step), np.float32(1e-6))
     grids = np.zeros((2, *weight.shape), np.float32)
     made = np.zeros_like(field)
     for _ in range(4):
-        for c in range(2):
-            grids[c] += _onto(np.ascontiguousarray(field[:, :, c] - made[:, :, c]), step) / weight
-        made = _pixels(grids, step, shape)
+        rest = field - made
+        grids += _onto_all([np.ascontiguousarray(rest[:, :, c]) for c in range(2)], step, ranges) / weight
+        made = _pixels(grids, step, shape, ranges)
     return made
 
 
@@ -200,31 +206,32 @@ def _compared(first: Field, second: Field, flow: Field, places: Field) -> _Compa
     return _Compared(xx, xy, yy, bx, by, square, inside, noise)
 
 
-def _step(seen: _Compared, step: int, active: Field) -> Field:
+def _step(seen: _Compared, step: int, active: Field, ranges: Ranges) -> Field:
     """One step of Gauss-Newton on the vertices `active`: what is to be added to the flow."""
-    xx, yy = _onto(seen.xx, step, 2), _onto(seen.yy, step, 2)
-    stiff = _stiffness(xx, yy)
-    free = active / (np.stack((xx, yy)) + stiff)
-    right = np.stack((_onto(seen.bx, step), _onto(seen.by, step)))
-    move = np.clip(_solve(seen, right, free, stiff, step), -MOST, MOST)
-    return _pixels(np.asarray(move, np.float32), step, seen.inside.shape)
+    squares = _onto_all([seen.xx, seen.yy], step, ranges, 2)
+    stiff = _stiffness(squares)
+    free = active / (squares + stiff)
+    right = _onto_all([seen.bx, seen.by], step, ranges)
+    move = np.clip(_solve(seen, right, free, stiff, step, ranges), -MOST, MOST)
+    return _pixels(np.asarray(move, np.float32), step, seen.inside.shape, ranges)
 
 
-def _covariance(seen: _Compared, step: int) -> Field:
+def _covariance(seen: _Compared, step: int, ranges: Ranges) -> Field:
     """Of every pixel (H, W, 3), as its vertex alone would have it."""
-    xx, xy, yy = _onto(seen.xx, step, 2), _onto(seen.xy, step, 2), _onto(seen.yy, step, 2)
+    xx, xy, yy = _onto_all([seen.xx, seen.xy, seen.yy], step, ranges, 2)
     # how well the frames agree around a vertex; pixels outside say nothing: as bad as a whole grey
-    weight = _onto(np.ones_like(seen.inside), step)
-    variance = (_onto(seen.square, step) + (weight - _onto(seen.inside, step))) / np.maximum(weight, 1e-6)
+    weight, square, inside = _onto_all([np.ones_like(seen.inside), seen.square, seen.inside], step, ranges)
+    variance = (square + (weight - inside)) / np.maximum(weight, 1e-6)
     variance = np.maximum(variance, np.float32(0.25 * seen.noise**2))
-    stiff = _stiffness(xx, yy)
+    stiff = _stiffness(np.stack((xx, yy)))
     xx, yy = xx + stiff, yy + stiff
     grids = np.stack((yy, -xy, xx)) * (variance / (xx * yy - xy * xy))
-    return _pixels(np.asarray(grids, np.float32), step, seen.inside.shape)
+    return _pixels(np.asarray(grids, np.float32), step, seen.inside.shape, ranges)
 
 
-def _stiffness(xx: Field, yy: Field) -> np.float32:
-    return np.float32(STIFFNESS * float(np.mean(xx + yy)) + 1e-12)
+def _stiffness(squares: Field) -> np.float32:
+    """Of the diagonal (2, rows, columns) of the normal equations."""
+    return np.float32(STIFFNESS * 2.0 * float(np.mean(squares)) + 1e-12)
 
 
 def _onto(field: Field, step: int, power: int = 1) -> Field:
@@ -233,17 +240,31 @@ def _onto(field: Field, step: int, power: int = 1) -> Field:
     return grid
 
 
-def _pixels(grids: Field, step: int, shape: tuple[int, ...]) -> Field:
+def _onto_all(fields: list[Field], step: int, ranges: Ranges, power: int = 1) -> Field:
+    """Fields (H, W) onto the grid: (K, rows, columns)."""
+    grids = np.empty((len(fields), *_grid_shape(fields[0].shape[0], fields[0].shape[1], step)), np.float32)
+
+    def call(begin: int, end: int) -> None:
+        for k in range(begin, end):
+            gather(fields[k], step, power, grids[k])
+
+    ranges(len(fields), call, 1)
+    return grids
+
+
+def _pixels(grids: Field, step: int, shape: tuple[int, ...], ranges: Ranges) -> Field:
     """Splines (K, rows, columns) at all pixels: (H, W, K)."""
-    out = np.empty((*shape, len(grids)), np.float32)
-    part = np.empty(shape, np.float32)
-    for k, grid in enumerate(grids):
-        spread(np.ascontiguousarray(grid, np.float32), step, part)
-        out[:, :, k] = part
-    return out
+    parts = np.empty((len(grids), *shape), np.float32)
+
+    def call(begin: int, end: int) -> None:
+        for k in range(begin, end):
+            spread(np.ascontiguousarray(grids[k], np.float32), step, parts[k])
+
+    ranges(len(grids), call, 1)
+    return np.asarray(cv2.merge(list(parts)), np.float32)
 
 
-def _solve(seen: _Compared, right: Field, free: Field, stiff: np.float32, step: int) -> Field:
+def _solve(seen: _Compared, right: Field, free: Field, stiff: np.float32, step: int, ranges: Ranges) -> Field:
     """Conjugate gradients: (2, rows, columns) of coefficients.
 
     free : the inverse of the diagonal, which preconditions; 0 for vertices that are held still.
@@ -252,9 +273,16 @@ def _solve(seen: _Compared, right: Field, free: Field, stiff: np.float32, step: 
     # a cell is reached by the vertices of its four rows and columns
     busy = np.ascontiguousarray(cv2.dilate((free[0] > 0).astype(np.uint8), FOUR, anchor=(0, 0))[:-3, :-3] > 0)
 
+    parts = np.empty((BANDS, *right.shape), np.float32)
+    edges = [len(busy) * band // BANDS for band in range(BANDS + 1)]
+
     def apply(v: Field) -> Field:
-        out = np.empty_like(v)
-        normal_product(v, busy, seen.xx, seen.xy, seen.yy, step, out)
+        def call(begin: int, end: int) -> None:
+            for n in range(begin, end):
+                normal_product(v, busy, seen.xx, seen.xy, seen.yy, step, edges[n], edges[n + 1], parts[n])
+
+        ranges(BANDS, call, 1)
+        out = parts.sum(axis=0)
         for c in range(2):
             out[c] += stiff * (v[c] - 0.25 * np.asarray(cv2.filter2D(v[c], -1, CROSS, borderType=cv2.BORDER_REPLICATE)))
         return out

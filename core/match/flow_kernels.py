@@ -74,13 +74,14 @@ def gather(field, step, power, out):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.void(F32_3D, BOOL_2D, F32_2D, F32_2D, F32_2D, i64, f32[:, :, ::1]),
+    types.void(F32_3D, BOOL_2D, F32_2D, F32_2D, F32_2D, i64, i64, i64, f32[:, :, ::1]),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
-def normal_product(grid, busy, xx, xy, yy, step, out):  # type: ignore[no-untyped-def]
+def normal_product(grid, busy, xx, xy, yy, step, first, stop, out):  # type: ignore[no-untyped-def]
     """The normal equations times a displacement on the grid (2, rows, columns), without ever making their matrix.
 
     busy : (rows - 3, columns - 3), the cells that a vertex which is not zero or not held still reaches.
+    first, stop : the rows of cells whose part of the sum is made.
     """
     height, width = xx.shape
     columns = grid.shape[2]
@@ -88,7 +89,7 @@ def normal_product(grid, busy, xx, xy, yy, step, out):  # type: ignore[no-untype
                       np.empty(columns, np.float32))  # fmt: skip
     table = _table(step)
     out[:] = 0.0
-    for y in range(height):
+    for y in range(first * step, min(stop * step, height)):
         j = y // step
         if not busy[j].any():
             continue

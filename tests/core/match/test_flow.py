@@ -103,12 +103,14 @@ def test_cells_that_no_free_vertex_reaches_add_nothing_to_the_normal_equations()
     for part, field in zip(expected, (xx * u + xy * v, xy * u + yy * v), strict=True):
         gather(field, 8, 1, part)
     made = np.empty_like(grid)
-    normal_product(grid, np.ones((15, 20), bool), xx, xy, yy, 8, made)
+    normal_product(grid, np.ones((15, 20), bool), xx, xy, yy, 8, 0, 15, made)
     np.testing.assert_allclose(made, expected, atol=1e-3)
     busy = np.zeros((15, 20), bool)
     busy[2:6, 4:8] = busy[14:, 19:] = True  # the cells of the two vertices
-    normal_product(grid, busy, xx, xy, yy, 8, made)
-    np.testing.assert_allclose(made, expected, atol=1e-3)
+    halves = [made, np.empty_like(made)]
+    for half, (first, stop) in zip(halves, ((0, 7), (7, 15)), strict=True):
+        normal_product(grid, busy, xx, xy, yy, 8, first, stop, half)
+    np.testing.assert_allclose(halves[0] + halves[1], expected, atol=1e-3)
 
 
 def test_flow_is_read_by_another_library(tmp_path):
