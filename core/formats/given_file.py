@@ -41,7 +41,8 @@ def decoded_json(path: Path, kind: type[_T], what: str, largest: int = LARGEST_J
     try:
         if path.stat().st_size > largest:
             raise UserError(f"{path.name} is too large for {what}.")
-        return msgspec.json.decode(path.read_bytes(), type=kind)
+        data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")  # editors of Windows begin a file so
+        return msgspec.json.decode(data, type=kind)
     except (OSError, ValueError) as error:
         if isinstance(error, (msgspec.DecodeError, UnicodeDecodeError)):
             raise UserError(f"{path.name} is not {what}: {str(error).rstrip('.')}.") from None

@@ -150,7 +150,7 @@ def read_poses(path: Path, rig: Rig, mesh: Mesh | None = None) -> PoseFile:
             _check_control(control, rig, where)
             each = tuple(reach) if isinstance(reach, list) else (reach,)
             if not each or not all(1e-6 <= one <= 1e6 for one in each):
-                raise UserError(f"{where}: the falloff of {control!r} must be above 0, not {reach}.")
+                raise UserError(f"{where}: the falloff of {control!r} must lie between 0 and a million, not {reach}.")
             if control not in moved_controls(pose, at_rest):
                 notes.append(f"{where}: the falloff of {control!r} has no effect, for the pose leaves it at rest.")
                 continue

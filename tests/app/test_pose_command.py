@@ -50,7 +50,8 @@ POSES = [
 
 
 def build(folder, poses, *extra, kernel="gaussian", **more):
-    (folder / "poses.json").write_text(json.dumps({"kernel": kernel, "poses": poses, **more}))
+    said = json.dumps({"kernel": kernel, "poses": poses, **more})
+    (folder / "poses.json").write_text(said, "utf-8-sig")  # as editors of Windows write it
     return filoplume("pose", folder / "arm.glb", "--poses", folder / "poses.json", *extra, "--json")
 
 
