@@ -7,8 +7,8 @@ subdivided only where it earns it: where the coarse spline explains the frames w
 search far without explaining them better. What not even the finest grid can follow, an edge of the motion, stays as
 the search found it.
 
-Every pixel has a covariance: from the normal equations around its vertex, from how far the search back from the second
-frame misses it, and from how much the frames still differ there.
+Every pixel has a covariance: from the normal equations of the coarsest grid, from how far the search back from the
+second frame misses it, and from how much the frames still differ there.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def flow_between(
     """
     if first.shape != second.shape:
         raise ValueError("flow needs two frames of one size")
-    start, back = search_flow(first, second, ranges)
+    start, backs = search_flow(first, second, spacing, ranges)
     a, b = even_grey(first, second)
     y, x = np.mgrid[0 : a.shape[0], 0 : a.shape[1]]
     places = np.stack((x, y), axis=2).astype(np.float32)
@@ -87,20 +87,24 @@ def flow_between(
         for _ in range(rounds):
             seen = _compared(ga, gb, flow, places)
             flow = flow + _step(seen, step, active, ranges)
-        part = _soft(torn, 5) if level else np.ones((1, 1, 1), np.float32)
-        covariance = covariance + part * (_covariance(seen, step, ranges) - covariance)
+        if not level:
+            covariance = _covariance(seen, step, ranges)
     flow = flow + _soft(_torn(a, b, flow, start, left, places), 3) * (start - flow)
     apart = ALIKE + APART * _disagreement(a, b, flow, places)
-    backs = fitted(back, spacing, ranges), fitted(back, 2 * spacing, ranges)
     return Flow(flow, NOTHING * covariance + apart[:, :, None] * _missed(flow, start, backs, places))
 
 
-def search_flow(first: Field, second: Field, ranges: Ranges = serial_ranges) -> tuple[Field, Field]:
-    """Dense inverse search between two frames (H, W, C), there and, with less care, back: (H, W, 2) pixels each."""
+def search_flow(
+    first: Field, second: Field, spacing: int, ranges: Ranges = serial_ranges
+) -> tuple[Field, tuple[Field, Field]]:
+    """Dense inverse search between two frames (H, W, C): (H, W, 2) pixels there; and, with less care, back.
+
+    The way back is smoothed over `spacing` pixels and over twice as many.
+    """
     grey = [(255.0 * np.clip(image, 0.0, 1.0)).astype(np.uint8) for image in even_grey(first, second)]
-    found: list[Field] = [np.zeros((*image.shape, 2), np.float32) for image in grey]
+    found: list[Field] = [np.zeros((*image.shape, 2), np.float32) for image in grey] * 2
     if min(grey[0].shape) < LEAST_SIDE:
-        return found[0], found[1]
+        return found[0], (found[1], found[1])
 
     def call(begin: int, end: int) -> None:
         for n in range(begin, end):
@@ -110,9 +114,11 @@ def search_flow(first: Field, second: Field, ranges: Ranges = serial_ranges) -> 
             search.setGradientDescentIterations(12)
             search.setVariationalRefinementIterations((4, 2)[n])
             found[n] = np.asarray(search.calc(grey[n], grey[1 - n], found[n]), np.float32)
+            if n:  # here, beside the longer search
+                found[2:] = [fitted(found[n], step) for step in (spacing, 2 * spacing)]
 
     ranges(2, call, 1)
-    return found[0], found[1]
+    return found[0], (found[2], found[3])
 
 
 def _warped(image: Field, flow: Field, places: Field, how: int) -> Field:
