@@ -11,7 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from core.feather.attributes import NAMES, column
@@ -20,6 +20,7 @@ from core.feather.surface import (
     END,
     LENGTH,
     NODES,
+    ROW,
     START,
     along_barb,
     edge_of_share,
@@ -79,6 +80,9 @@ class BarbCurves(NamedTuple):
     sides: NDArray[np.intp]
     places: NDArray[np.float32]
     flat: NDArray[np.float32]
+
+LONGS, WORDS, SIGNED, BYTES = (
+    types.Array(kind, 1, "C", readonly=True) for kind in (types.int64, types.uint16, types.int16, types.uint8))
 
 
 @njit(cache=True)
@@ -175,7 +179,12 @@ def condense_feather(a, seed, place, length, stray, lift, free, tone):  # type: 
     return n
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.void(
+        types.Array(types.float32, 2, "C", readonly=True), LONGS, LONGS, types.int64, types.int64, types.uint16[::1],
+        types.uint16[::1], types.int16[::1], types.int16[::1], types.uint8[::1], types.uint8[::1], types.int64[::1],
+    ), cache=True, nogil=True,
+)
 def _condense(values, seeds, starts, start, stop, place, length, stray, lift, free, tone, found):  # type: ignore[no-untyped-def]
     for i in range(start, stop):
         k, e = starts[i], starts[i + 1]
@@ -201,7 +210,12 @@ def condense(values: NDArray[np.float32], seeds: NDArray[Any], ranges: Any = ser
     return Barbs(np.concatenate([[0], np.cumsum(found)]), *columns)  # type: ignore[arg-type]
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.void(
+        ROW, WORDS, WORDS, SIGNED, SIGNED, BYTES, BYTES, types.float32[:, :, ::1], types.float32[:, :, ::1],
+        types.float32[:, :, ::1],
+    ), cache=True, nogil=True,
+)
 def _expand(a, place, length, stray, lift, free, tone, points, places, flat):  # type: ignore[no-untyped-def]
     table = np.empty((NODES, 12))
     shaft_table(a, table)

@@ -5,19 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from core.feather.coloring import vane_mesh
 from core.feather.pieces import FeatherMesh, Floats, grid_triangles, unit
-from core.feather.surface import LENGTH, NODES, edge_of_share, flat_to_feather, shaft_table, vane_width
+from core.feather.surface import LENGTH, NODES, ROW, edge_of_share, flat_to_feather, shaft_table, vane_width
 
 TEXELS = 512  # along the feather: a texel is a fifth of a percent of its length
 SAMPLES = 2  # on a side of a texel, while its picture is taken
 ROWS, COLUMNS = 25, 9
+PLACES = types.Array(types.float32, 2, "C", readonly=True)
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.void(
+        PLACES, PLACES, ROW, types.Array(types.int32, 2, "C", readonly=True), types.float64, types.float64, types.int64,
+        types.float64[:, :, ::1],
+    ), cache=True, nogil=True,
+)
 def _rasterize(flat, colors, opacity, triangles, corner_x, corner_y, scale, sums):  # type: ignore[no-untyped-def]
     """Triangles in the flat feather into (H, W, 4): sums of colour times cover, and cover; later ones lie over."""
     high, wide = sums.shape[:2]
@@ -43,7 +49,10 @@ def _rasterize(flat, colors, opacity, triangles, corner_x, corner_y, scale, sums
                 sums[y, x, 3] = sums[y, x, 3] * (1.0 - cover) + cover
 
 
-@njit(cache=True)
+@njit(
+    types.void(ROW, types.float64[::1], types.float64[::1], types.float64[::1], types.float64[:, :, ::1]),
+    cache=True, nogil=True,
+)
 def _bend(a, across, along, widths, out):  # type: ignore[no-untyped-def]
     table = np.empty((NODES, 12))
     shaft_table(a, table)
@@ -55,7 +64,7 @@ def _bend(a, across, along, widths, out):  # type: ignore[no-untyped-def]
             out[r, c, 0], out[r, c, 1], out[r, c, 2] = scale * p0, scale * p1, scale * p2
 
 
-@njit(cache=True)
+@njit(types.float64(ROW, types.int64), cache=True, nogil=True)
 def _widest(a, side):  # type: ignore[no-untyped-def]
     wide = 1e-4
     for k in range(64):

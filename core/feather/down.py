@@ -6,12 +6,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from core.feather.attributes import column
 from core.feather.noise import noise1, signed
-from core.feather.surface import LENGTH, NODES, on_shaft, shaft_table
+from core.feather.surface import LENGTH, NODES, ROW, on_shaft, shaft_table
 
 DENSITY, HAIR_LENGTH = column("downHairDensityVane*"), column("downHairLengthVane*")
 LENGTH_NOISE, HAIR_START = column("downHairLengthNoiseVane*"), column("downHairStartVane*")
@@ -57,7 +57,11 @@ def _hair(a, table, key, seed, side, root, drop, length, curl, points, flat):  #
         flat[k, 0], flat[k, 1] = sign * x, root + y
 
 
-@njit(cache=True)
+@njit(
+    types.void(
+        ROW, types.int64, types.int64[::1], types.float32[:, :, ::1], types.float32[:, :, ::1], types.int64[::1]
+    ), cache=True, nogil=True,
+)
 def _down(a, seed, counts, points, flat, sides):  # type: ignore[no-untyped-def]
     table = np.empty((NODES, 12))
     shaft_table(a, table)

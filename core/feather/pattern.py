@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from core.feather.attributes import column
 from core.feather.noise import noise1, noise2, signed
-from core.feather.surface import smoothstep
+from core.feather.surface import ROW, smoothstep
 
 BASE, MIDDLE, TIP = column("colorBaseRed"), column("colorMiddleRed"), column("colorTipRed")
 INNER_COLOR, EDGE_COLOR, BAND_COLOR = column("colorInnerRed"), column("colorEdgeRed"), column("colorTipBandRed")
@@ -32,7 +32,8 @@ SPOT_WAVER, SPOT_START, SPOT_END = column("spotWaver"), column("spotStart"), col
 STREAK, STREAK_WIDTH = column("streakStrength"), column("streakWidth*")
 STREAK_SOFT, STREAK_TAPER = column("streakSoftness"), column("streakTaper")
 MOTTLE, MOTTLE_SCALE, MOTTLE_SHARP = column("mottleStrength"), column("mottleScale"), column("mottleSharpness")
-ROW = types.Array(types.float32, 1, "C", readonly=True)
+ROWS = types.Array(types.float32, 2, "C", readonly=True)
+SIDES = types.Array(types.int8, 1, "C", readonly=True)
 
 
 @njit(cache=True, inline="always")
@@ -92,7 +93,7 @@ def vane_color(a, side, u, s, seed, color):  # type: ignore[no-untyped-def]
         color[k] = min(max(color[k] * bright, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(types.void(ROW, SIDES, ROWS, types.int64, types.float32[:, ::1]), cache=True, nogil=True)
 def _colors(a, sides, places, seed, out):  # type: ignore[no-untyped-def]
     color = np.empty(3)
     for i in range(len(places)):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from core.feather.attributes import column
 from core.feather.nurbs import Nurbs, clamped_knots
-from core.feather.surface import END, LENGTH, NODES, on_shaft, shaft_table, smoothstep
+from core.feather.surface import END, LENGTH, NODES, ROW, on_shaft, shaft_table, smoothstep
 
 RADIUS, RADIUS_TIP, SHAFT_TAPER = column("shaftRadius"), column("shaftRadiusTip"), column("shaftTaper")
 CALAMUS, CALAMUS_RADIUS = column("shaftCalamusLength"), column("shaftCalamusRadius")
@@ -42,7 +42,11 @@ def shaft_radius(a, place):  # type: ignore[no-untyped-def]
     return rachis * swell * (1.0 - a[CALAMUS_TAPER] * below * below)
 
 
-@njit(cache=True)
+@njit(
+    types.void(
+        ROW, types.Array(types.float64, 2, "C", readonly=True), types.float64[::1], types.float64[:, :, ::1]
+    ), cache=True, nogil=True,
+)
 def _sections(a, corners, places, out):  # type: ignore[no-untyped-def]
     table = np.empty((NODES, 12))
     shaft_table(a, table)

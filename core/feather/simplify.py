@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.void(types.Array(types.float64, 2, "C", readonly=True), types.float64, types.boolean[::1]),
+    cache=True, nogil=True,
+)
 def _keep(line, tolerance, kept):  # type: ignore[no-untyped-def]
     stack = np.empty((len(line) + 1, 2), np.int64)
     stack[0, 0], stack[0, 1] = 0, len(line) - 1

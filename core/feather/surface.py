@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import njit, types
 
 from core.feather.attributes import column
 
@@ -33,6 +33,7 @@ RUFFLE, RUFFLE_COUNT, RUFFLE_PHASE = column("vaneRuffle*"), column("vaneRuffleCo
 BARB_BASE, BARB_MIDDLE, BARB_TIP = column("barbAngleBase*"), column("barbAngleMiddle*"), column("barbAngleTip*")
 BARB_CURVE = column("barbCurve*")
 LENGTH = column("shaftLength")
+ROW = types.Array(types.float32, 1, "C", readonly=True)  # all attributes of a feather, as kernels take them
 
 NODES = 17  # of the table of a shaft
 REACH = 1.25  # where the table ends, in shaft lengths: vanes may reach beyond the shaft

@@ -57,7 +57,10 @@ def _grow_and_measure(box, bin_boxes, b):  # type: ignore[no-untyped-def]
     return x * y + y * z + z * x
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.Tuple((types.int64, types.int32[::1]))(F32_2D, I32_2D, types.float32[:, ::1], types.int32[:, ::1]),
+    cache=True, nogil=True,
+)
 def build_tree(points, triangles, boxes, children):  # type: ignore[no-untyped-def]
     """Fill boxes and children; returns the number of nodes and the triangle of each slot (-1: an empty lane)."""
     count = len(triangles)
