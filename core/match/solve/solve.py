@@ -471,7 +471,8 @@ class _Problem:
             return [(rigid, True)]
         added: tuple[tuple[int, ...], ...] = ((), (FOCAL,), (K1,), (FOCAL, K1))
         models = [tuple(sorted({*more, *asked})) for more in added]
-        tries = [*((columns, False) for columns in models), (rigid, True)]
+        zooms = [] if self.views.alone.all() else [(rigid, True)]  # photographs have no order a zoom could go by
+        tries = [*((columns, False) for columns in models), *zooms]
         return [one for k, one in enumerate(tries) if one not in tries[:k]]
 
     def _changed(self, state: State, columns: tuple[int, ...], zoom: bool, free: bool) -> tuple[str, ...]:
