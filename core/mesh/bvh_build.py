@@ -12,6 +12,7 @@ from core.mesh.bvh_kernels import LANES, STACK_SIZE
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 I32_1D = types.Array(types.int32, 1, "C", readonly=True)
 I32_2D = types.Array(types.int32, 2, "C", readonly=True)
+BUILT = types.Tuple((types.int64, types.int32[::1]))  # type: ignore[no-untyped-call]
 
 MAX_SAH_DEPTH = 30  # deeper nodes are halved by count, so that no tree outgrows the stack
 BINS = 16
@@ -57,10 +58,7 @@ def _grow_and_measure(box, bin_boxes, b):  # type: ignore[no-untyped-def]
     return x * y + y * z + z * x
 
 
-@njit(
-    types.Tuple((types.int64, types.int32[::1]))(F32_2D, I32_2D, types.float32[:, ::1], types.int32[:, ::1]),
-    cache=True, nogil=True,
-)
+@njit(BUILT(F32_2D, I32_2D, types.float32[:, ::1], types.int32[:, ::1]), cache=True, nogil=True)
 def build_tree(points, triangles, boxes, children):  # type: ignore[no-untyped-def]
     """Fill boxes and children; returns the number of nodes and the triangle of each slot (-1: an empty lane)."""
     count = len(triangles)
