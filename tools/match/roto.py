@@ -4,42 +4,34 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from core.document import free_id
 from core.errors import UserError
 from core.field import field
 from core.match.outline import Mask, key_mask, outline_at
-from core.overlay import Circle, Overlays, Polyline
-from core.record import Record, freeze
+from core.overlay import Circle, Overlays
+from core.record import freeze
 from tools.match.craft import Marks, MatchGround
+from tools.match.drawn_shape import ShapeParams, Way
 from tools.tool import Pointer, Stroke, Tool
 
-Array = NDArray[np.float64]
 REACH = 9.0  # pixels of the view
-LEAST = 3  # points of a shape
 
 
-class RotoParams(Record):
+class RotoParams(ShapeParams):
     """Settings of Roto mask."""
 
-    smooth: Annotated[bool, field(
-        "Curve", "New shapes are smooth curves through their points instead of straight lines.")] = True
-    detail: Annotated[float, field(
-        "Detail", "How far, in pixels of the view, a new shape may be off the way of the hand.", "px",
-        (1.0, 12.0), (0.5, 40.0), step=0.5)] = 4.0
     whole: Annotated[bool, field(
         "Move whole shape", "A point that is dragged takes the whole shape with it instead of going alone.")] = False
 
 
 class DrawShape:
-    """The way of the hand, closed at the release."""
+    """A new shape."""
 
     def __init__(self, params: RotoParams, ground: MatchGround, pointer: Pointer) -> None:
         self.ground, self.params = ground, params
-        self.way = [ground.place(pointer)]
+        self.way = Way(params, ground, pointer, "trouble")
 
     @property
     def step(self) -> str | None:
@@ -48,15 +40,13 @@ class DrawShape:
 
     def extend(self, matter: Marks, pointers: tuple[Pointer, ...]) -> Marks:
         """Nothing is made before the release."""
-        self.way += [self.ground.place(pointer) for pointer in pointers]
+        self.way.extend(pointers)
         return matter
 
     def finish(self, matter: Marks) -> Marks:
         """A mask with as few points as keep it near the way of the hand."""
-        way = np.array(self.way)
-        off = self.params.detail / self.ground.scale
-        points = cv2.approxPolyDP(way.astype(np.float32).reshape(-1, 1, 2), off, True).reshape(-1, 2).astype(np.float64)
-        if len(points) < LEAST:
+        points = self.way.outline()
+        if points is None:
             raise UserError("Draw around what tracks must not look at, and let go where you began.")
         number = free_id(matter.masks)
         made = Mask(
@@ -66,7 +56,7 @@ class DrawShape:
 
     def overlays(self) -> Overlays:
         """The way so far."""
-        return (Polyline(self.ground.in_view(np.array(self.way)), "trouble", 1.5, closed=True, dashed=True),)
+        return self.way.overlays()
 
 
 class MovePoint:

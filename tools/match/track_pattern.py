@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
-from core.field import field
 from core.match.track import Track, TrackSettings
-from core.overlay import Circle, Overlays, Polyline
-from core.record import Record, freeze
+from core.overlay import Circle, Overlays
+from core.record import freeze
 from tools.match.box import LARGEST, SMALLEST
 from tools.match.craft import Marks, MatchGround
+from tools.match.drawn_shape import ShapeParams, Way
 from tools.match.point import SQUARE
 from tools.match_edits import place_at, with_track
 from tools.tool import Pointer, Stroke, Tool
 
 Array = NDArray[np.float64]
 REACH = 9.0  # pixels of the view
-LEAST = 3  # points of a shape
-
-
-class PatternParams(Record):
-    """Settings of Track pattern."""
-
-    smooth: Annotated[bool, field(
-        "Curve", "New shapes are smooth curves through their points instead of straight lines.")] = True
-    detail: Annotated[float, field(
-        "Detail", "How far, in pixels of the view, a new shape may be off the way of the hand.", "px",
-        (1.0, 12.0), (0.5, 40.0), step=0.5)] = 4.0
 
 
 class _Shaping:
@@ -98,21 +85,19 @@ class MovePattern(_Shaping):
 class DrawPattern(_Shaping):
     """The way of the hand, closed at the release: the new outline."""
 
-    def __init__(self, params: PatternParams, ground: MatchGround, track: Track, pointer: Pointer) -> None:
+    def __init__(self, params: ShapeParams, ground: MatchGround, track: Track, pointer: Pointer) -> None:
         super().__init__(ground, track, pointer)
-        self.params, self.way = params, [self.start]
+        self.params, self.way = params, Way(params, ground, pointer, "accent")
 
     def extend(self, matter: Marks, pointers: tuple[Pointer, ...]) -> Marks:
         """Nothing is made before the release."""
-        self.way += [self.ground.place(pointer) for pointer in pointers]
+        self.way.extend(pointers)
         return matter
 
     def finish(self, matter: Marks) -> Marks:
         """The track with a pattern of that shape, beside its point where it was drawn there."""
-        way = np.array(self.way)
-        off = self.params.detail / self.ground.scale
-        points = cv2.approxPolyDP(way.astype(np.float32).reshape(-1, 1, 2), off, True).reshape(-1, 2).astype(np.float64)
-        if len(points) < LEAST or np.ptp(way, axis=0).max() < SMALLEST:
+        points = self.way.outline()
+        if points is None or self.way.span < SMALLEST:
             raise UserError(f"Draw around what the track should be followed by, {SMALLEST} pixels or larger.")
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         x, y = map(float, middle - self.place)
@@ -120,10 +105,10 @@ class DrawPattern(_Shaping):
 
     def overlays(self) -> Overlays:
         """The way so far."""
-        return (Polyline(self.ground.in_view(np.array(self.way)), "accent", 1.5, closed=True, dashed=True),)
+        return self.way.overlays()
 
 
-class TrackPattern(Tool[PatternParams]):
+class TrackPattern(Tool[ShapeParams]):
     """Shapes the pattern of the active track."""
 
     name = "track_pattern"
@@ -135,7 +120,7 @@ class TrackPattern(Tool[PatternParams]):
     step = "Track pattern"
     craft = "match"
     edits = "marks"
-    Params = PatternParams
+    Params = ShapeParams
 
     def begin(self, ground: MatchGround, pointer: Pointer) -> Stroke[Marks]:
         """A corner, the pattern, or a new shape in the hand."""
