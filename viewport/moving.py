@@ -71,6 +71,7 @@ class Moving:
         self._guides_moved: list[NDArray[np.bool_]] = []
         self._last_guides: list[GuideLines] = []
         self._touched = Touched((0, 0))  # by all that moved since
+        self._worked_out: tuple[Any, ...] | None = None  # which hairs amidst which finished picture
         self._sparse: list[tuple[Coat, Coat]] = []  # in the scene, and what is drawn of it
         self._near: list[tuple[GuideLines, GuideLines]] = []
 
@@ -83,6 +84,11 @@ class Moving:
                 (g, near_guides(g, camera, self._turning) if g.points is points else near) for g, near in self._near
             ]
         self.touched.append((points, rows))
+
+    def forget_touched(self) -> None:
+        """Forget which rows changed: a finished picture is begun that shows them all, in light worked out anew."""
+        self.touched = []
+        self._worked_out = None
 
     def draw(
         self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, size: tuple[int, int], options: ViewOptions,
@@ -107,9 +113,13 @@ class Moving:
         maps.bind()
         # under a brush, amidst a finished picture, one look at the light serves; in a turning view it would shimmer
         softness = {} if picture is None else {"tap_reach": 0}
-        for drawable in drawables:
-            self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            _finish(drawable.work_out({**uniforms, **softness, "sparse": self._strands_across(drawable) > 1.0}))
+        self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        stale = self._stale(None if picture is None else picture[1])
+        for coat, rows in zip(self.coats, stale, strict=True):
+            across = {"sparse": self._strands_across(coat) > 1.0}
+            _finish(coat.work_out({**uniforms, **softness, **across}, rows))
+        for guides in self.guides:
+            _finish(guides.work_out(uniforms))
         self.opening = False
         behind = self.base if picture is None else self._patched(scene, camera, picture, uniforms["clip_from_world"])
         self.touched = []
@@ -123,6 +133,24 @@ class Moving:
             matrix = uniforms["clip_from_world"]
             _finish(self.renderer.ribbons.draw(drawable.textures, order, points, matrix, target, across=across))
         return sum(len(coat.points) for _, coat in self._sparse)
+
+    def _stale(self, number: int | None) -> list[NDArray[np.intp] | None]:
+        """Rows of what is drawn of every coat that moved since it was last worked out; None for all of them.
+
+        Amidst the same finished picture nothing else changes: neither camera nor light nor which hairs are drawn.
+        """
+        now = number, tuple((mine, drawn.order) for mine, (_, drawn) in zip(self.coats, self._sparse, strict=True))
+        before, self._worked_out = self._worked_out, now
+        if number is None or not same(before, now):
+            return [None] * len(self.coats)
+        rows: list[NDArray[np.intp] | None] = []
+        for coat, drawn in self._sparse:
+            moved = np.zeros(len(coat.points), bool)
+            for points, changed in self.touched:
+                if points is coat.points:
+                    moved[changed] = True
+            rows.append(np.flatnonzero(moved[drawn.order]))
+        return rows
 
     def _strands_across(self, drawable: CoatDrawable | GuideDrawable) -> float:
         return self._across.get(id(_shown(drawable)), 1.0)

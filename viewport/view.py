@@ -190,7 +190,7 @@ class View3D:
         scene, renderer = self.scene, self.renderer
         lit, key = self._light_key(), self._picture_key()
         self._lit = None  # the maps are being drawn anew
-        self.moving.touched = []
+        self.moving.forget_touched()
         preparing = renderer.prepare(scene, self.camera, self.size, self.options)
         prepared: Prepared | None = None
         while prepared is None:

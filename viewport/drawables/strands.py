@@ -18,6 +18,8 @@ SHADOW_HAIRS = 150_000  # more than these are drawn into the light's maps as eve
 SHADOW_PIECES = 6  # a hair casts its shadow as this many straight pieces at least
 STRANDS_AT_ONCE = 1 << 14  # uploaded between two steps
 LINE_PIECES_AT_ONCE = 1 << 16  # drawn from the light between two steps
+SOME = 2048  # strands that may be worked out alone; more are worked out all together
+QUAD = np.array([0, 1, 2, 2, 1, 3], np.uint32)  # its corners as two triangles
 ABSORPTION = 0.4  # per width of hair over width of texel; below 1 as hair scatters light onwards
 
 
@@ -26,7 +28,8 @@ class StrandPrograms:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         points = "strand_points.glsl"
-        self.shade = program(ctx, ("fullscreen.vert",), (points, "display.glsl", "lighting.glsl", "strand_shade.frag"))
+        self.shade = program(
+            ctx, (points, "strand_rows.vert"), (points, "display.glsl", "lighting.glsl", "strand_shade.frag"))
         self.depth = program(ctx, (points, "strand_light.vert"), ("depth_only.frag",))
         self.opacity = program(ctx, (points, "strand_light.vert"), ("strand_opacity.frag",))
 
@@ -65,6 +68,8 @@ class CoatDrawable:
         self.normals = self.textures.per_strand_texture()
         self.tints_stale = self.normals_stale = True
         self.shade = ctx.vertex_array(programs.shade, [])
+        self.corners = ctx.buffer(reserve=24 * SOME, dynamic=True)
+        self.shade_some = ctx.vertex_array(programs.shade, [], index_buffer=self.corners, index_element_size=4)
         self.depth = ctx.vertex_array(programs.depth, [])
         self.opacity = ctx.vertex_array(programs.opacity, [])
 
@@ -136,9 +141,10 @@ class CoatDrawable:
             )
             yield
 
-    def work_out(self, uniforms: dict[str, Any]) -> Iterator[None]:
+    def work_out(self, uniforms: dict[str, Any], rows: NDArray[np.integer] | None = None) -> Iterator[None]:
         """Shade every point and lay its ribbon out on the screen (into the textures that the ribbons read), in steps.
 
+        rows : the strands to work out, where nothing else has changed since the last time; None for all of them.
         Other things may be drawn between the steps, as long as they leave units 4, 5 and 6 alone.
         """
         prog, look = self.programs.shade, self.coat.look
@@ -149,7 +155,15 @@ class CoatDrawable:
             **uniforms, "strand_tints": 1, "strand_normals": 2, "widths": (look.root_width, look.tip_width),
             "root_color": look.root, "tip_color": look.tip, "blend": look.blend, "gloss": look.gloss,
             "roughness": look.roughness, "absorption": ABSORPTION * look.depth,
+            "some_alone": rows is not None and len(rows) <= SOME, "texels": self.textures.sides.size,
         })
+        if rows is not None and len(rows) <= SOME:
+            self.corners.write((4 * rows.astype(np.uint32)[:, None] + QUAD).data)
+            self.textures.target.viewport = (0, 0, *self.textures.sides.size)
+            self.textures.target.use()
+            self.textures.points.use(0)
+            self.shade_some.render(moderngl.TRIANGLES, vertices=6 * len(rows))
+            return
         for _ in self.textures.shading():
             self.textures.points.use(0)
             self.tints.use(1)
@@ -159,7 +173,10 @@ class CoatDrawable:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        for thing in (self.shade, self.depth, self.opacity, self.tints, self.normals, self.textures):
+        for thing in (
+            self.shade_some, self.corners, self.shade, self.depth, self.opacity, self.tints, self.normals,
+            self.textures,
+        ):
             thing.release()
 
 
