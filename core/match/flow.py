@@ -36,6 +36,7 @@ LEAST_GREY = 0.001  # of the range of grey: by so much the spline may explain wo
 FAR, BETTER = 0.5, 0.9  # pixels off the search, and how little of its disagreement must then be left
 WINDOW = 7  # pixels: side of the neighbourhood two flows are compared over
 NOTHING = np.float32(0.0003)  # of the covariance of a vertex alone: it tells where there is nothing to see
+ROUNDING = 0.3 / 255.0  # standard deviation of a grey of 8 bits: two flat frames are alike, and that says nothing
 LEAST_SHARE = 0.1  # of a cell that is subdivided
 NEAR, WIDE = 5, 31  # pixels: sides of the windows over which the searches are compared with the flow
 ALIKE, APART = 0.5, 10.0  # of what the searches miss: counted where the frames agree, and more by how they differ
@@ -228,7 +229,7 @@ def _covariance(seen: _Compared, step: int, ranges: Ranges) -> Field:
     # how well the frames agree around a vertex; pixels outside say nothing: as bad as a whole grey
     weight, square, inside = _onto_all([np.ones_like(seen.inside), seen.square, seen.inside], step, ranges)
     variance = (square + (weight - inside)) / np.maximum(weight, 1e-6)
-    variance = np.maximum(variance, np.float32(0.25 * seen.noise**2))
+    variance = np.maximum(variance, np.float32(max(0.25 * seen.noise**2, ROUNDING**2)))
     stiff = _stiffness(np.stack((xx, yy)))
     xx, yy = xx + stiff, yy + stiff
     grids = np.stack((yy, -xy, xx)) * (variance / (xx * yy - xy * xy))

@@ -43,6 +43,8 @@ def test_where_there_is_nothing_to_see_the_flow_is_unsure():
         image[:, 80:] = 0.5
     sigma = np.sqrt(flow_between(first, second).covariance[:, :, 0])
     assert np.median(sigma[:, 100:150]) > 5 * np.median(sigma[20:100, 10:60])
+    blank = np.full_like(first, 0.5)
+    assert np.sqrt(flow_between(blank, blank).covariance[:, :, 0]).min() > 1.0
 
 
 def test_light_that_changes_over_the_frame_is_no_motion():
