@@ -38,6 +38,17 @@ FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"  # the chap
 STYLES = ("short", "fur", "long", "mane")
 
 
+def shot() -> None:
+    """The dark plate of the demo of matchmove beside what was solved from it."""
+    from app.report import Report
+    from app.shot_demo import make_shot
+
+    with tempfile.TemporaryDirectory() as folder:
+        make_shot(Path(folder), Report(True))
+        image = cv2.imread(str(Path(folder) / "match.jpg"))
+        cv2.imwrite(str(PICTURES / "match-shot.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 86])
+
+
 def first_groom() -> None:
     """Follow the first groom by hand in the real window; a picture of the window after every step."""
     ensure_display()  # before anything of Qt is made
@@ -133,6 +144,7 @@ def main() -> None:
     feathers()
     first_groom()
     first_pose()
+    shot()
     evaluator = Evaluator()
     document = demo_document(evaluator)
     children = {1: grow(document.grooms[0], document.meshes[0].mesh, evaluator)}

@@ -26,16 +26,20 @@ POSE_FRAMES = (1001, 1017, 1045, 1065)
 
 
 def command(
-    what: Annotated[str | None, typer.Argument(help="pose for the demo of pose space; without a word, the groomed animal.", show_default=False)] = None,
+    what: Annotated[str | None, typer.Argument(help="pose for the demo of pose space, match for that of matchmove; without a word, the groomed animal.", show_default=False)] = None,
     mesh: Annotated[Path | None, typer.Option(help="Another animal than the demo's.")] = None,
     folder: Annotated[Path, typer.Option(help="Where the files go.")] = Path("out"),
     hairs: Annotated[int, typer.Option(min=0, max=20_000_000, help="Hairs to grow.")] = 120_000,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Write the demo: a groomed animal (demo.filo, .usdc, .png), or with pose an arm and a face (pose.filo, .png)."""
-    if what not in (None, "pose"):
-        raise typer.BadParameter(f"there is no demo {what}; say pose, or nothing for the animal")
+    """Write the demo: a groomed animal (demo.filo, .usdc, .png); with pose an arm and a face (pose.filo, .png); with
+    match a dark plate, tracked and solved: camera, head and neck (match.filo, .usda, .jpg)."""
+    if what not in (None, "pose", "match"):
+        raise typer.BadParameter(f"there is no demo {what}; say pose, match, or nothing for the animal")
     folder.mkdir(parents=True, exist_ok=True)
+    if what == "match":
+        _match(folder, as_json)
+        return
     if what == "pose":
         _pose(folder, as_json)
         return
@@ -84,3 +88,19 @@ def _pose(folder: Path, as_json: bool) -> None:
         {"poses": poses, "outputs": outputs, "seconds": report.seconds},
         [f"an arm and a face with the poses {', '.join(poses)}:", *outputs],
     )
+
+
+def _match(folder: Path, as_json: bool) -> None:
+    from app.shot_demo import make_shot
+
+    report = Report(as_json)
+    with report.working(total=4):
+        done, outputs = make_shot(folder, report)
+    told = {
+        "camera_mm": done.camera_mm, "camera_degrees": done.camera_degrees, "head_degrees": done.head_degrees,
+        "neck_degrees": done.neck_degrees, "warnings": list(done.warnings), "outputs": outputs,
+        "seconds": report.seconds,
+    }
+    report.done(told, [
+        f"against what the plate was made of: the camera is {done.camera_mm:.1f} mm and {done.camera_degrees:.3f} degrees "
+        f"off, the head {done.head_degrees:.3f}, the neck's joints {done.neck_degrees:.2f} degrees:", *outputs])

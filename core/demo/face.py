@@ -58,9 +58,9 @@ class Face(NamedTuple):
 
 def face() -> Face:
     """Model the face, always the same: about 31,000 quads, metres, y up, looking along +z; its eyes are balls."""
-    ball, quads = _cube_sphere(SIDE)
+    ball, quads = cube_sphere(SIDE)
     skin = _features(_skull(ball))
-    eyeball, eye_quads = _cube_sphere(16)
+    eyeball, eye_quads = cube_sphere(16)
     eyes = [eyeball * EYEBALL + (side * EYE[0], EYE[1], _eye_depth()) for side in (1.0, -1.0)]
     points = np.concatenate([skin, *eyes])
     counts = [len(skin), len(eyeball), len(eyeball)]
@@ -83,8 +83,8 @@ def face() -> Face:
     return Face(mesh, rig, tuple(sculpts))
 
 
-def _cube_sphere(side: int) -> tuple[Array, NDArray[np.int64]]:
-    """Unit points and quads, counter-clockwise from outside, of a cube blown up; denser towards +z."""
+def cube_sphere(side: int) -> tuple[Array, NDArray[np.int64]]:
+    """Unit points and quads, counter-clockwise from outside, of a cube blown up."""
     t = np.tan(np.linspace(-0.25 * np.pi, 0.25 * np.pi, side + 1))
     a, b = np.meshgrid(t, t, indexing="ij")
     one = np.ones_like(a)
