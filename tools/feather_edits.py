@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,15 @@ from numpy.typing import ArrayLike
 from core.document import Document, find_feathers, find_mesh, free_id, keys_of, with_feathers, with_groom
 from core.errors import UserError
 from core.evaluator import Evaluator
-from core.feather.coat.coat import FeatherCoat, Placement, Stroke, Tract
+from core.feather.attributes import ATTRIBUTES, COLUMNS
+from core.feather.coat.coat import AttributeValue, DialTurn, FeatherCoat, Placement, Stroke, Tract
 from core.feather.coat.dress import KEYS, Dressed, dress_feathers
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.proxy import demoted, keyed, promoted
+from core.feather.coat.worn import for_all, worn_preset
+from core.feather.presets import preset_values
 from core.record import freeze
+from core.value import Constant, Value, constant
 
 
 def add_feathers(
@@ -56,6 +61,60 @@ def set_feathers(document: Document, coat_id: int, **changes: Any) -> Document:
         return with_feathers(document, coat.replace(**changes))
     except (ValueError, TypeError) as error:
         raise UserError(f"This cannot be set: {error}.") from error
+
+
+def set_attributes(document: Document, coat_id: int, changes: Mapping[str, Value | float]) -> Document:
+    """The document with attributes of all feathers of a coat set, by their names (``core.feather.attributes``).
+
+    Raises
+    ------
+    UserError
+        There is no attribute of a name, or a number lies outside its range.
+    """
+    coat = _free(document, coat_id)
+    made = {item.name: item for item in coat.attributes}
+    for name, given in changes.items():
+        if name not in COLUMNS:
+            raise UserError(f"A feather has no attribute {name!r}; docs/feather.md says how to list them.")
+        known = ATTRIBUTES[COLUMNS[name]]
+        value = given if isinstance(given, Value) else constant(given)
+        item = AttributeValue(name=name, value=value)
+        if for_all(item) and isinstance(value.base, Constant) and not known.low <= value.base.number <= known.high:
+            raise UserError(f"{name} goes from {known.low:g} to {known.high:g}, not {value.base.number:g}.")
+        made[name] = item
+    return set_feathers(document, coat_id, attributes=tuple(made.values()))
+
+
+def reset_attributes(document: Document, coat_id: int, names: Collection[str] | None = None) -> Document:
+    """The document with attributes of a coat, all by default, again those of its bird."""
+    coat = _free(document, coat_id)
+    kept = () if names is None else tuple(item for item in coat.attributes if item.name not in names)
+    return set_feathers(document, coat_id, attributes=kept)
+
+
+def turn_dial(document: Document, coat_id: int, name: str, position: float) -> Document:
+    """The document with a dial of a coat's feathers (``core.feather.dials``) turned to a position -1 .. 1."""
+    coat = _free(document, coat_id)
+    others = tuple(dial for dial in coat.dials if dial.name != name)
+    try:
+        turned = (DialTurn(name=name, position=position),) if position else ()
+    except ValueError as error:
+        raise UserError(f"This dial cannot be turned: {error}.") from error
+    return set_feathers(document, coat_id, dials=(*others, *turned))
+
+
+def wear_feather(document: Document, coat_id: int, values: ArrayLike, part: str = "body") -> Document:
+    """The document with the feathers of a coat like one feather, `values` (K,) all its attributes, dials at 0.
+
+    part : of the bird, where they become that feather; elsewhere its bird's feathers take on what differs.
+    """
+    coat = _free(document, coat_id)
+    wanted, worn = np.asarray(values, np.float32), preset_values(worn_preset(coat, part))
+    items = tuple(
+        AttributeValue(name=known.name, value=constant(float(wanted[column])))
+        for column, known in enumerate(ATTRIBUTES) if wanted[column] != worn[column]
+    )  # fmt: skip
+    return set_feathers(document, coat_id, attributes=items, dials=())
 
 
 def add_placement(document: Document, coat_id: int, placement: Placement) -> Document:

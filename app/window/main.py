@@ -27,6 +27,7 @@ from app.window.console import Console
 from app.window.craft_panels import CoatPanel, RespectPanel, ToolPanel
 from app.window.crash import CrashBar, CrashWatch
 from app.window.desk import Desk
+from app.window.feather.side import FeatherSide
 from app.window.files.doors import Doors
 from app.window.files.file_actions import FileActions
 from app.window.files.opening import Opening
@@ -73,7 +74,7 @@ from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
-AROUND = ("shelf", "timeline", "curves", "pose_map")  # panels that are not in the column
+AROUND = ("shelf", "timeline", "curves", "pose_map", "feather")  # panels that are not in the column
 COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
 
 
@@ -115,8 +116,10 @@ class MainWindow(QMainWindow):
         self.timeline = Timeline(self.desk)
         self.curves = CurvePanel(self.desk, self.commands, self.hotkeys)
         self.pose_side = PoseSide(self.desk)
+        self.feather_side = FeatherSide(self.desk, self.viewport.draw_beside, FoldMemory(self._folder))
         self.panels: dict[str, QWidget] = {
-            "shelf": self.shelf, "timeline": self.timeline, "curves": self.curves, "pose_map": self.pose_side}
+            "shelf": self.shelf, "timeline": self.timeline, "curves": self.curves, "pose_map": self.pose_side,
+            "feather": self.feather_side}
         self.column = self._make_column()
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
@@ -166,7 +169,7 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
-        self.sides = BesideView(self.view, self.pose_side)
+        self.sides = BesideView(BesideView(self.view, self.pose_side), self.feather_side)
         self.middle.addWidget(self.sides)
         self.middle.addWidget(self.doors)
         self.split.addWidget(self.middle)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QCursor,
@@ -41,6 +42,7 @@ from app.window.pose.views import PoseViews
 from app.window.tablet import BUTTON_NAMES, modifier_names, mouse_pointer, pen_pointer, place_pointer
 from app.window.theme import look_of
 from app.window.view_figures import ViewFigures
+from core.camera import Camera
 from core.document import Document
 from core.errors import UserError
 from core.gate import gate_box, seen_through
@@ -49,11 +51,13 @@ from core.workspace import Workspace
 from tools.tool import Pointer, Sight
 from viewport.gate import gate_marks
 from viewport.panes import corner_of, pane_at, size_of
+from viewport.scene import Scene
 from viewport.view import TEXT_PIXELS, HudLine
 
 if TYPE_CHECKING:
     from app.window.live_picture import LivePicture
     from viewport.live_scene import Done, Job
+    from viewport.renderer import Renderer
 
 CALM_MS = 120  # after the last movement, before the picture is finished
 
@@ -89,6 +93,7 @@ class Viewport(QOpenGLWindow):
         self.frames = self.refined_frames = 0
         self._budget_ms = budget_ms
         self._ctx: moderngl.Context | None = None
+        self._beside: Renderer | None = None  # of scenes in panels, made for the first of them
         self._screen: moderngl.Framebuffer | None = None
         self._stale = True
         self._wants_paint = True
@@ -181,6 +186,18 @@ class Viewport(QOpenGLWindow):
             self._lent -= 1
             self.redraw()
 
+    def draw_beside(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8] | None:
+        """A small scene of a panel, drawn at once: (height, width, 3) uint8 sRGB; None while nothing can be drawn."""
+        if self._ctx is None:
+            return None
+        from viewport.picture import render
+        from viewport.renderer import Renderer
+
+        self.makeCurrent()
+        if self._beside is None:
+            self._beside = Renderer(self._ctx)
+        return render(scene, camera, *size, ctx=self._ctx, kept=self._beside)
+
     def gate_rect(self) -> QRect:
         """What the film gate takes of the view in device pixels; all of it where none is shown."""
         (width, height), view = self.pixels(), self.desk.workspace.view
@@ -213,6 +230,9 @@ class Viewport(QOpenGLWindow):
             self.plate.release()
             self.picture.release()
             self.picture = None
+            if self._beside is not None:
+                self._beside.release()
+                self._beside = None
             if self._ctx is not None:
                 self._ctx.release()
                 self._ctx = self._screen = None

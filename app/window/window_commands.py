@@ -22,6 +22,7 @@ PANELS = {
     "library": ("Pose library", "Shows or hides the poses that are kept by name for later."),
     "rig": ("Rig", "Shows or hides the abstract controls and the constraints of the rig."),
     "pose_map": ("Pose map", "Shows or hides the map of pose space beside the model."),
+    "feather": ("Feather", "Shows or hides the editor of one feather beside the coat that wears it."),
     "plate": ("Plates", "Shows or hides the list of plates, with film, crop, colours and what tracking sees."),
     "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
     "solve": ("Solve", "Shows or hides the solved camera: how good it is, what may be wrong, what to mend."),
@@ -33,11 +34,11 @@ PANELS = {
 }
 # panels that belong to one craft; the others are those of all
 PANEL_CRAFTS = {
-    "coat": "groom", "maps": "groom", "controls": "pose", "poses": "pose", "library": "pose", "rig": "pose",
-    "pose_map": "pose", "tracks": "match", "solve": "match", "plate": "match",
+    "coat": "groom", "maps": "groom", "feather": "groom", "controls": "pose", "poses": "pose", "library": "pose",
+    "rig": "pose", "pose_map": "pose", "tracks": "match", "solve": "match", "plate": "match",
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
-AT_FIRST_HIDDEN = ("curves",)
+AT_FIRST_HIDDEN = ("curves", "feather")
 PUT_AWAY = "-"  # before the name of a panel in Workspace.panels that was hidden by hand
 TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels
 _SETTINGS = "app.window.settings.save_settings"

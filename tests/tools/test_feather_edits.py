@@ -6,8 +6,11 @@ import pytest
 from core.document import Document, MeshObject, without_groom, without_mesh
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.attributes import ATTRIBUTES, COLUMNS
 from core.feather.coat.coat import Placement
 from core.feather.coat.plumage import Plumage
+from core.feather.coat.worn import worn_preset, worn_values
+from core.feather.presets import preset_values
 from core.formats.project import read_project, write_project
 from core.mesh.skin import skin_at_rest
 from core.value import constant
@@ -64,6 +67,28 @@ def test_tracts_strokes_placements_and_fields_are_set(document):
     found = made.feathers[0]
     assert (len(found.placements), found.tracts[0].name, found.direction) == (2, "back", "strokes")
     assert document.feathers[0] is coat
+
+
+def test_attributes_and_dials_of_a_coat_shape_its_feathers_and_go_back(document):
+    coat = document.feathers[0]
+    body = preset_values("goldfinch-breast")
+    made = edits.set_attributes(document, coat.id, {"vaneWidthLeft": 0.4, "vaneCupRight": constant(1.0)})
+    made = edits.turn_dial(made, coat.id, "stiffness", 1.0)
+    worn = worn_values(made.feathers[0], "goldfinch-breast")
+    assert worn[COLUMNS["vaneWidthLeft"]] == np.float32(0.4)
+    assert worn[COLUMNS["vaneCupRight"]] == 1.0
+    np.testing.assert_allclose(worn[COLUMNS["shaftRadius"]], 1.5 * body[COLUMNS["shaftRadius"]], rtol=1e-6)
+    made = edits.turn_dial(edits.reset_attributes(made, coat.id, ["vaneWidthLeft"]), coat.id, "stiffness", 0.0)
+    worn = worn_values(made.feathers[0], "goldfinch-breast")
+    assert [ATTRIBUTES[k].name for k in np.flatnonzero(worn != body)] == ["vaneCupRight"]
+    assert worn_values(edits.reset_attributes(made, coat.id).feathers[0], "goldfinch-breast") is body
+
+
+def test_a_coat_becomes_a_feather_of_another_bird(document):
+    wanted = preset_values("owl-primary")
+    turned = edits.turn_dial(document, 1, "wear", 0.5)
+    made = edits.wear_feather(turned, 1, wanted).feathers[0]
+    np.testing.assert_array_equal(worn_values(made, worn_preset(made)), wanted)
 
 
 def test_what_cannot_be_done_is_said(document, evaluator):

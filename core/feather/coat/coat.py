@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from core.feather.dials import DIAL_NAMES
 from core.feather.presets import bird_names
 from core.field import field, fields_of
 from core.mesh.roots import Roots
@@ -92,6 +93,18 @@ class AttributeValue(Record):
     value: Value
 
 
+class DialTurn(Record):
+    """A dial (``core.feather.dials``) turned away from 0; `position` from -1 to 1."""
+
+    name: str
+    position: float
+
+    def __post_init__(self) -> None:
+        number(self, "position", least=-1.0, most=1.0)
+        if self.name not in DIAL_NAMES:
+            raise ValueError(f"DialTurn.name must be one of {', '.join(DIAL_NAMES)}, not {self.name!r}")
+
+
 class KeyAttributes(Record):
     """Attributes of single keys, interpolated over the skin between them.
 
@@ -139,7 +152,8 @@ class FeatherCoat(Record):
     """Feathers on one mesh of the document.
 
     id : stable, unique among feather coats. keys_id : the groom whose guides are the keys, or None.
-    preset : the bird feathers take their attributes from (``core.feather.presets``).
+    preset : the bird feathers take their attributes from (``core.feather.presets``). Over it come `attributes`, over
+        those that are one number for all feathers the `dials` (``core.feather.coat.worn``).
     """
 
     id: int
@@ -154,6 +168,7 @@ class FeatherCoat(Record):
     tracts: tuple[Tract, ...] = ()
     strokes: tuple[Stroke, ...] = ()
     attributes: tuple[AttributeValue, ...] = ()
+    dials: tuple[DialTurn, ...] = ()
     key_attributes: KeyAttributes | None = None
     proxies: tuple[Proxy, ...] = ()
     direction: Annotated[str, field(
@@ -230,7 +245,7 @@ class FeatherCoat(Record):
             raise ValueError(f"FeatherCoat.direction must be one of {', '.join(DIRECTIONS)}, not {self.direction!r}")
         if len(self.placements) > 2**7 - 1:
             raise ValueError("FeatherCoat.placements are at most 127")
-        for name, items in (("tracts", self.tracts), ("attributes", self.attributes)):
+        for name, items in (("tracts", self.tracts), ("attributes", self.attributes), ("dials", self.dials)):
             if len({item.name for item in items}) != len(items):
                 raise ValueError(f"FeatherCoat.{name} holds two of the same name")
         if len({proxy.id for proxy in self.proxies}) != len(self.proxies):

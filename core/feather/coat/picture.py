@@ -8,9 +8,10 @@ from scipy.interpolate import CubicSpline
 
 from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.plumage import Laid
+from core.feather.coat.worn import worn_values
 from core.feather.coloring import vane_mesh
 from core.feather.pieces import FeatherMesh, Floats, grid_triangles, joined, unit
-from core.feather.presets import load_bird, preset_values
+from core.feather.presets import load_bird
 from core.random import rand
 
 ROWS, COLUMNS = 19, 9  # of a vane as it is drawn: enough for bars and for the curve of an outline
@@ -28,7 +29,7 @@ def coat_meshes(laid: Laid, coat: FeatherCoat, grid: tuple[int, int] = (ROWS, CO
     names = np.array([worn["body"], *(worn.get(tract.name, worn["body"]) for tract in coat.tracts)])
     rows = np.flatnonzero(laid.shown)
     wears = names[laid.bed.tract[rows].astype(np.intp)]
-    return tuple(_worn(laid, rows[wears == name], preset_values(str(name)), grid) for name in np.unique(wears))
+    return tuple(_worn(laid, rows[wears == name], worn_values(coat, str(name)), grid) for name in np.unique(wears))
 
 
 def _worn(laid: Laid, rows: NDArray[np.intp], values: Floats, grid: tuple[int, int]) -> FeatherMesh:

@@ -39,7 +39,8 @@ from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import LENGTH, pose_vanes
 from core.feather.coat.proxy import apply_proxies
-from core.feather.presets import load_bird, preset_values
+from core.feather.coat.worn import for_all, worn_values
+from core.feather.presets import load_bird
 from core.feather.vane import SHAPE_COLUMNS, vane_grids
 from core.groom.groom import Groom, Map
 from core.groom.maps import sample_map
@@ -211,8 +212,8 @@ class Plumage:
             rank, sides = self._remember("order", lambda: _ordered(bed, flow_frames, ranges), bed, directions)
         now = rest_frame if frame is None else frame
         own = self._remember(
-            "own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields, coat.attributes, coat.width,
-            coat.preset, None if keys is None else keys.maps)
+            "own", lambda: self._own(coat, fields, rest_frame, mesh, keys, bed), fields, coat.attributes, coat.dials,
+            coat.width, coat.preset, None if keys is None else keys.maps)
         if (now != rest_frame and any(moves(item.value) for item in coat.attributes)) or moves(coat.width):
             own = self._own(coat, fields, now, mesh, keys, bed)  # what is animated, at this frame alone
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
@@ -287,15 +288,15 @@ class Plumage:
     ) -> NDArray[np.float32]:
         """Vanes of all feathers in their own frames, at length 1."""
         worn = load_bird(coat.preset).feathers
-        table = np.tile(preset_values(worn["body"])[: len(SHAPE_COLUMNS)], (len(bed.places.ids), 1))
+        table = np.tile(worn_values(coat, worn["body"])[: len(SHAPE_COLUMNS)], (len(bed.places.ids), 1))
         for number, tract in enumerate(coat.tracts):
             if tract.name in worn:  # a tract called as a part of the bird wears what that part wears
-                table[bed.tract == number + 1] = preset_values(worn[tract.name])[: len(SHAPE_COLUMNS)]
+                table[bed.tract == number + 1] = worn_values(coat, worn[tract.name])[: len(SHAPE_COLUMNS)]
         for name, column in SHAPE_COLUMNS.items():
             if name in fields:
                 table[:, column] = fields[name]
         for item in coat.attributes:
-            if item.name in SHAPE_COLUMNS:
+            if item.name in SHAPE_COLUMNS and not for_all(item):
                 table[:, SHAPE_COLUMNS[item.name]] = self._evaluated(item.value, fields, frame, mesh, keys, bed)
         table[:, SHAPE_COLUMNS["shaftLength"]] = 1.0
         width = self._number(coat, "width", fields, frame, mesh, keys, bed)
