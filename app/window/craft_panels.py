@@ -16,6 +16,7 @@ from core.field import fields_of
 from core.groom.groom import NAMES, Coat
 from core.record import Record
 from core.workspace import Respect, Workspace
+from tools.map_edits import ROLES
 
 OF_GUIDES = ("hairspray", "selection")  # of what is respected: other crafts have no guides
 
@@ -156,6 +157,9 @@ class CoatPanel(_Panel):
         self.set_title("Coat" if feathers is None else "Feathers")
         if feathers is None:
             self.show_record(groom.id, groom.coat, Setting(self.unit, frame, NAMES, maps))
+            assert self.form is not None
+            for role in ROLES:  # they are given beside the maps themselves
+                self.form.rows[role].hide()
         else:
             self.show_record(groom.id, feathers, Setting(self.unit, frame, FEATHER_NAMES, maps))
 

@@ -25,6 +25,7 @@ from app.window.fields.combo import Combo
 from app.window.files.opening import choose_file
 from app.window.keymap import Keymap, normal, shown
 from app.window.settings import write_whole
+from app.window.theme import look_of
 from core.errors import UserError
 
 _MODIFIER_KEYS = {
@@ -291,4 +292,4 @@ class KeymapEditor(QDialog):
             low.addWidget(widget)
         for part in (top, self.table, self.message, keys, low):
             layout.addWidget(part) if isinstance(part, QWidget) else layout.addLayout(part)
-        self.resize(680, 560)
+        self.resize(57 * look_of().text, 47 * look_of().text)

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QPushButton, QScroll
 from app.window.desk import Desk
 from app.window.icons import IconButton
 from app.window.params_panel import RecordForm
+from app.window.theme import look_of
 from core.record import Record
 from core.workspace import Workspace
 
@@ -35,7 +36,7 @@ class PicturesDialog(QDialog):
         low.addWidget(close)
         whole.addWidget(self._area, 1)
         whole.addLayout(low)
-        self.resize(420, 380)
+        self.resize(35 * look_of().text, 32 * look_of().text)
         desk.workspace_changed.connect(self._workspace_changed)
         desk.session_replaced.connect(self.refresh)
         self.refresh()

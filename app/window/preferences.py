@@ -70,7 +70,7 @@ class Preferences(QDialog):
         low.addWidget(close)
         layout.addWidget(tabs, 1)
         layout.addLayout(low)
-        self.resize(460, 420)
+        self.resize(38 * look_of().text, 35 * look_of().text)
         self.refresh()
 
     def refresh(self) -> None:
