@@ -14,9 +14,8 @@ from PySide6.QtTest import QTest
 
 from app.window.pose.controls import PoseControls
 from app.window.pose.poses import PoseList
-from core.demo.pose_document import pose_document
+from core.demo.pose_document import pose_document, pose_workspace
 from core.formats.project import write_project
-from core.workspace import Workspace
 from docs.first_groom import Step
 from tests.window.hand import LEFT, Hand
 
@@ -25,7 +24,8 @@ SIZE = (1600, 980)
 
 def opens(hand: Hand, folder: Path) -> None:
     path = folder / "pose.filo"
-    write_project(path, pose_document(), Workspace(craft="pose", tool="grab"))
+    document = pose_document()
+    write_project(path, document, pose_workspace(document))
     hand.window.opening.open(path)
     hand.until(lambda: bool(hand.window.desk.document.meshes), 60_000)
     hand.until(hand.window.viewport.isExposed)

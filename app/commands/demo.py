@@ -14,13 +14,12 @@ from app.deliver import deliver, draw, posed_document
 from app.report import Report
 from core.camera import frame_points
 from core.demo import demo_document
-from core.demo.pose_document import pose_document
+from core.demo.pose_document import pose_document, pose_workspace
 from core.document import Document
 from core.evaluator import Evaluator
 from core.formats.project import write_project
 from core.groom.grow import grow
 from core.mesh.skin import Skin
-from core.workspace import Workspace
 
 POSE_FRAMES = (1001, 1017, 1045, 1065)
 
@@ -77,7 +76,7 @@ def _pose(folder: Path, as_json: bool) -> None:
     with report.working(total=6):
         document = pose_document(stage=report.stage)
         with report.stage("export_filo", f"writing {project}"):
-            write_project(project, document, Workspace(craft="pose", tool="grab"))
+            write_project(project, document, pose_workspace(document))
         for path, frame in pictures:
             with report.stage("export_picture", f"drawing {path.name}"):
                 draw_poses(path, document, posed_document(document, frame, evaluator))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from core.camera import frame_points
 from core.demo.arm import arm
 from core.demo.arm_sculpts import arm_sculpts
 from core.demo.face import face
@@ -18,7 +19,9 @@ from core.pose.pose import Pose, local_of_pose
 from core.pose.rig import Rig
 from core.pose.rotation import quaternion_from_euler
 from core.pose.skeleton import Clip
+from core.pose.synthesis import evaluate_at, prepare
 from core.transform import Array, translation
+from core.workspace import Workspace
 
 FIRST, FRAMES = 1001, 96
 FACE_AT = (0.95, 0.02, 0.0)  # metres; beside the hand
@@ -46,6 +49,16 @@ def pose_document(stage: Stage = no_stages) -> Document:
         expressions = build(mesh.points, rig, sculpts).correctives
         second = MeshObject(id=2, name="face", mesh=mesh, rig=rig, correctives=expressions)
     return Document(first_frame=FIRST, last_frame=FIRST + FRAMES - 1, fps=24.0, meshes=(first, second))
+
+
+def pose_workspace(document: Document) -> Workspace:
+    """Where the demo opens: the craft of posing, with arm and face seen from the front through all of their clip."""
+    seen = [
+        evaluate_at(item.mesh.points, item.rig, prepare(item.correctives, item.rig), FIRST + frame)
+        for item in document.meshes if item.rig is not None for frame in _ARM
+    ]
+    camera = frame_points(np.concatenate(seen), (-0.25, -0.15, -1.0), aspect=0.9)
+    return Workspace(craft="pose", tool="grab", cameras=(camera,))
 
 
 # frames: degrees of elbow about z, wrist about x, shoulder about z; the face: valence, arousal

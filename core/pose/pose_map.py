@@ -125,7 +125,7 @@ def embed_plane(dofs: Sequence[Dof], axes: tuple[Axis, Axis], pose: Pose, plane:
     return np.asarray(out, np.float64)
 
 
-def falloff_ring(space: PoseSpace, sample: int | None, axes: tuple[Axis, Axis], points: int = 48) -> Array:
+def falloff_ring(space: PoseSpace, sample: int | None, axes: tuple[Axis, Axis], points: int = 120) -> Array:
     """The rim (points, 2) in the plane of two axes where a pose is just one falloff away from a sample of the space.
 
     With a number on each axis an ellipse whose half axes are the falloffs. A direction in which the pose is felt
