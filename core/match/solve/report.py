@@ -18,6 +18,7 @@ NOISE, TOO_NOISY = 1.3, 3.0  # residuals over the noise of the tracks: said; ref
 FOCAL_SIGMA = 0.03
 PATH, NO_PATH = 0.03, 0.3  # uncertainty of the path over its size
 OUT, TOO_MANY_OUT = 0.4, 0.49  # share of the tracks that do not fit
+JOINED = 0.75  # share of the frames that have a camera; fewer are parts that do not hang together
 APART, MOVES = 1.5, 2.0  # of the typical error; of the doubt of the path: worth a look
 TRANSLATION = "translation"
 
@@ -78,6 +79,8 @@ def report(solution: Solution, names: list[str], said: Sequence[str] | None = No
             f"No camera explains these tracks: they miss it by {noisy:.1f} times their own noise. Look for a second "
             "motion among them, for rolling shutter, or for strong lens distortion."
         )
+    if out > TOO_MANY_OUT and not solution.views.alone.any() and solution.known.mean() < JOINED:
+        raise UserError(_falls_apart(solution))
     if out > TOO_MANY_OUT:
         raise UserError(
             f"{round(100 * out)} % of the tracks do not fit the camera of the others: there may be two motions. Take "
@@ -107,6 +110,19 @@ def report(solution: Solution, names: list[str], said: Sequence[str] | None = No
         float(np.quantile(length, 0.95)), float(length.max()), by_frame, by_track, focal, sigma_f * typical, path,
         certain.points, certain.centres(), kind, tests, tuple(warnings),
         _advice(solution, names, said, rms, by_frame, by_track, fixes), fixes,
+    )
+
+
+def _falls_apart(solution: Solution) -> str:
+    """Why the frames of a shot could not be joined: where the fewest tracks go on from one to the next."""
+    seen = np.zeros((len(solution.frames), len(solution.held)), bool)
+    seen[solution.observations.frame, solution.observations.track] = True
+    common = (seen[1:] & seen[:-1]).sum(axis=1)
+    at = int(np.argmin(common))
+    return (
+        f"Only {int(solution.known.sum())} of {len(solution.frames)} frames could be joined: from frame "
+        f"{solution.frames[at]} to {solution.frames[at + 1]} only {common[at]} tracks go on. Track more points through "
+        "the whole shot, eight at least from each frame to the next."
     )
 
 

@@ -46,6 +46,9 @@ OUTLIER = 4.5  # standard deviations
 PICKED = 1.0 / 2000.0  # of the width of a photograph: noise of what was seen in photographs alone
 WILD = 0.005  # of the width of the picture: noise no tracker makes
 TOGETHER = 2e-3  # of the width of the picture: tracks so near to each other are one place
+ON_LINE = 1e-3  # of the width of the picture: tracks so near to a line lie on it
+ROOM, OUTSIDE = 0.1, 0.1  # of the size beyond the picture; share of the tracks that may be farther out
+EXACT = 0.05  # pixels: tracks are not seen better than that, computed ones are not trusted further
 FLOOR = 0.5  # pixels: noise where too few tracks are seen together to tell it
 HYPOTHESES = 6
 RAMPS = (0.35, -0.35)  # of the logarithm of the focal length from the first frame to the last
@@ -314,7 +317,7 @@ def _noise(observations: Observations, views: Views, size: tuple[int, int]) -> t
     number[shot] = np.arange(len(shot))
     part = observations.take(number[observations.frame] >= 0)
     told = noise_floor(part._replace(frame=number[part.frame]), len(shot))
-    pixels = FLOOR if told is None else told
+    pixels = FLOOR if told is None else max(told, EXACT)
     if pixels > WILD * size[0]:
         raise UserError(
             f"The tracks jump about by {pixels:.0f} px from frame to frame as no camera moves points: they are not "
@@ -341,22 +344,27 @@ def _check(observations: Observations, frames: Rows, tracks: int, views: Views) 
 
 def _check_places(observations: Observations, size: tuple[int, int]) -> None:
     """Raise UserError when tracks are not of a picture of `size`, or all at one place of it."""
-    low, high = np.quantile(observations.xy, [0.25, 0.75], axis=0)
-    if (high < -0.5).any() or (low > np.array(size) - 0.5).any() or (high - low > 2.0 * np.array(size)).any():
+    off = np.array(size) * ROOM
+    outside = ((observations.xy < -off) | (observations.xy > np.array(size) + off)).any(axis=1)
+    if outside.mean() > OUTSIDE:
         raise UserError(
-            f"Most tracks lie outside of a plate of {size[0]} x {size[1]} pixels; give the size of their own plate."
+            f"{max(1, round(100 * outside.mean()))} % of the tracks lie outside of a plate of {size[0]} x {size[1]} "
+            "pixels; give the size of their own plate."
         )
-    count = np.bincount(observations.frame)
-    spread = np.zeros(2)
+    count = np.maximum(np.bincount(observations.frame), 1)
+    away = observations.xy.copy()
     for axis in range(2):
-        places = observations.xy[:, axis]
-        mean = np.bincount(observations.frame, places) / np.maximum(count, 1)
-        spread[axis] = np.sqrt(np.mean((places - mean[observations.frame]) ** 2))
+        away[:, axis] -= (np.bincount(observations.frame, away[:, axis]) / count)[observations.frame]
+    spread = np.sqrt(np.mean(away**2, axis=0))
+    xx, xy, yy = (np.bincount(observations.frame, away[:, i] * away[:, j]) / count for i, j in ((0, 0), (0, 1), (1, 1)))
+    across = np.sqrt(np.maximum(0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy), 0.0))  # of the line through each frame
     if np.hypot(*spread) < TOGETHER * size[0]:
         raise UserError(
             f"The tracks all lie within {4.0 * np.hypot(*spread):.1f} px of each other; a camera needs them spread "
             "over the picture."
         )
+    if np.median(across[count > 2]) < ON_LINE * size[0]:
+        raise UserError("The tracks all lie on one line of the picture; a camera needs them spread over it.")
 
 
 class _Start(NamedTuple):
@@ -578,7 +586,8 @@ class _Problem:
         used &= known[observations.frame]
         final = residuals(state, observations.take(used))
         freedom = 2 * int(used.sum()) - len(columns) * int(known.sum()) - 3 * int(held.sum())
-        sigma = float(np.sqrt((final**2).sum() / max(1, freedom)))
+        exact = EXACT * self.noise / self.pixels  # of tracks that were computed: doubts are still those of a picture
+        sigma = max(float(np.sqrt((final**2).sum() / max(1, freedom))), exact)
         return Solution(
             state, self.frames, known, held, used, observations, start.kind, self.noise, sigma, tuple(self.keys),
             self.size, free, start.said, self.pixel, self.views, self.noise_told,

@@ -8,11 +8,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
+from core.match.solve.floor import noise_floor
 from core.match.solve.nodal import BY_CHANCE, parallax
 from core.match.solve.report import report
 from core.match.solve.slides import correlation, drift_gains
 from core.match.solve.solve import Options, solve
-from core.match.solve.state import Observations, State, start_lens
+from core.match.solve.state import Observations, State, projected, start_lens
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, Shot, path_error, shot, turn_error
 
 FRAMES = 40
@@ -160,3 +161,63 @@ def test_eight_tracks_are_right_and_say_how_sure_or_are_refused():
     error = path_error(found.state, made.truth, found.known) / size
     assert error < 3 * told.path_sigma
     assert told.path_sigma < 0.03 or told.warnings
+
+
+def test_tracks_that_live_for_a_third_of_the_shot_are_joined_through_all_of_it():
+    made = shot("orbit", 120, 60, seed=4)
+    born = np.random.default_rng(4).integers(-20, 58, 120)
+    rows = made.observations
+    rows = rows.take((rows.frame >= born[rows.track]) & (rows.frame < born[rows.track] + 20))
+    assert np.bincount(rows.frame).min() > 8
+    found = solve(rows, made.frames, 120, SIZE, Options(FOCAL))
+    told = report(found, [str(k) for k in range(120)])
+    assert found.known.all()
+    assert not told.warnings
+    assert path_error(found.state, made.truth, found.known) < 3 * told.path_sigma
+    assert told.path_sigma < 0.02
+
+
+def test_a_camera_that_stands_first_and_then_goes_is_solved():
+    scene = _scene(40, seed=3)
+    go = np.clip(2.0 * scene.t - 1.0, 0.0, 1.0)
+    made = _shot(scene._replace(centres=np.stack([2.0 * go, 0.0 * go, 0.3 * go], 1)))
+    found, told = _solved(made)
+    assert told.kind == "free"
+    assert found.known.all()
+    assert not told.warnings
+    assert path_error(found.state, made.truth, found.known) < 0.01
+
+
+@pytest.mark.parametrize(("rho", "wide"), [(0.0, 8.0), (0.5, 8.0), (0.0, 1.0)])
+def test_the_noise_of_tracks_is_told_through_a_fast_pan(rho, wide):
+    scene = _scene(400, seed=5)
+    scene = scene._replace(points=scene.points * [3.0, 1.0, 1.0], centres=0.1 * scene.centres)
+    turn = Rotation.from_euler("yx", np.stack([0.15 * wide * (scene.t - 0.5), 0.05 * np.sin(4 * scene.t)], 1))
+    made = _shot(scene._replace(turn=turn.as_matrix()), rho=rho)
+    assert 0.85 * NOISE < noise_floor(made.observations, FRAMES) < 1.35 * NOISE
+
+
+def test_tracks_without_any_noise_are_solved_and_doubted():
+    made = shot("nodal", 30, 10)
+    truth = made.truth._replace(rotation=np.tile(made.truth.rotation[:1], (10, 1, 1)))
+    rows = made.observations
+    frame, track = (a.ravel() for a in np.meshgrid(np.arange(10), np.unique(rows.track), indexing="ij"))
+    exact, _ = projected(truth, frame, truth.points[track])
+    root = np.tile([1.0, 0.0, 1.0], (len(frame), 1))
+    rows = Observations(frame.astype(np.int32), track.astype(np.int32), exact, root)
+    found = solve(rows, made.frames, 30, SIZE, Options())
+    told = report(found, [str(k) for k in range(30)])
+    assert any("focal length is known to" in words for words in told.warnings)
+
+
+def test_what_is_no_shot_is_refused_with_its_own_reason():
+    made = shot("orbit", 60, 30)
+    rows = made.observations
+    blocks = rows.take(rows.track // 10 == rows.frame // 5)
+    with pytest.raises(UserError, match="from frame 1005 to 1006 only 0 tracks go on"):
+        report(solve(blocks, made.frames, 60, SIZE, Options(FOCAL)), [str(k) for k in range(60)])
+    line = rows._replace(xy=np.stack([30.0 * rows.track + rows.frame, np.full(len(rows.track), 500.0)], 1))
+    with pytest.raises(UserError, match="on one line"):
+        solve(line, made.frames, 60, SIZE, Options(FOCAL))
+    with pytest.raises(UserError, match="lie outside of a plate of 720 x 576"):
+        solve(rows, made.frames, 60, (720, 576), Options(FOCAL))
