@@ -41,9 +41,11 @@ class Axis(NamedTuple):
         return self.dof.control if self.part == "number" else f"{self.dof.control} {self.part}"
 
 
-def axes_of(space: PoseSpace) -> tuple[Axis, ...]:
-    """All axes of a space, those along which its poses differ most first."""
-    found = [Axis(dof, part) for dof in space.dofs for part in PARTS[dof.kind]]
+def axes_of(space: PoseSpace, controls: Sequence[str] = ()) -> tuple[Axis, ...]:
+    """All axes of a space, those along which its poses differ most first; of equal ones in the order of `controls`."""
+    place = {name: k for k, name in enumerate(controls)}
+    dofs = sorted(space.dofs, key=lambda dof: place.get(dof.control, len(place)))
+    found = [Axis(dof, part) for dof in dofs for part in PARTS[dof.kind]]
     poses = [REST, *(s.pose for s in space.samples)]
     spread = [np.ptp([coordinate(axis, pose) for pose in poses]) / axis.dof.falloff[0] for axis in found]
     return tuple(found[i] for i in np.argsort(np.negative(spread), kind="stable"))

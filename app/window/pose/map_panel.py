@@ -28,6 +28,7 @@ from core.pose.pose_map import (
     weight_grid,
 )
 from core.pose.pose_space import PoseLayer
+from core.pose.rig import control_names
 from core.pose.synthesis import pose_at
 from core.workspace import Workspace
 from tools.pose_edits import hold_pose, same_pose
@@ -114,7 +115,7 @@ class PoseMap(QWidget):
         item = self.item
         assert item is not None
         assert item.correctives is not None
-        known = axes_of(layer.space)
+        known = axes_of(layer.space, () if item.rig is None else control_names(item.rig))  # as the pad has its dials
         self._axes = {axis.name: axis for axis in known}
         names = tuple(self._axes)
         two = len(names) > 1

@@ -70,6 +70,13 @@ def test_the_rim_of_a_swing_round_rest_is_the_circle_of_its_angle() -> None:
     assert np.abs(np.linalg.norm(rim, axis=1) - 0.7).max() < 1e-6
 
 
+def test_axes_come_by_how_far_the_poses_go_and_equal_ones_as_the_rig_has_them() -> None:
+    dofs = tuple(Dof(control=name, kind="number", falloff=(1.0,)) for name in ("arousal", "lid", "valence"))
+    space = PoseSpace(dofs=dofs, samples=(PoseSample(pose=numbers(arousal=1.0, valence=-1.0, lid=3.0)),))
+    assert [axis.name for axis in axes_of(space)] == ["lid", "arousal", "valence"]
+    assert [axis.name for axis in axes_of(space, ("valence", "arousal"))] == ["lid", "valence", "arousal"]
+
+
 @pytest.mark.parametrize("place", [(0.3, -0.4), (2.0, 1.0), (0.0, 0.0), (-1.2, 0.0)])
 def test_a_pose_put_at_a_place_is_found_there(place: tuple[float, float]) -> None:
     space = elbow()
