@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import Any
 
 import moderngl
@@ -79,13 +79,13 @@ class LightMaps:
         self.sums_target = ctx.framebuffer([self.sums])
 
     def draw(
-        self, scene: Scene, toward: NDArray[np.float64], cast_shadows: Callable[[NDArray[np.float64]], object],
+        self, scene: Scene, toward: NDArray[np.float64], cast_shadows: Callable[[NDArray[np.float64]], Iterable[None]],
         coats: Sequence[CoatDrawable],
         outline: NDArray[np.float32], shares: Sequence[float] = (),
     ) -> Generator[None, None, dict[str, Any]]:
         """Draw the maps in steps; returns the uniforms of lighting.glsl that describe them.
 
-        cast_shadows : draws the depth of all that is not hair. outline : of the scene, (M, 3).
+        cast_shadows : draws the depth of all that is not hair, in steps. outline : of the scene, (M, 3).
         shares : of each coat, see :meth:`CoatDrawable.draw_opacity`; 1 when not given.
         """
         ctx = self.ctx
@@ -99,8 +99,11 @@ class LightMaps:
         for target in (self.skin_target, self.first_target):
             target.use()
             target.clear(depth=1.0)
-            cast_shadows(matrix)
-        yield
+            for _ in cast_shadows(matrix):
+                yield
+                target.use()
+                ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
+                ctx.enable(moderngl.DEPTH_TEST)
         self.first_target.use()
         ctx.enable(moderngl.DEPTH_TEST)
         for coat in coats:

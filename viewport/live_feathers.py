@@ -14,16 +14,24 @@ from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat
 from core.feather.pieces import FeatherMesh
 from core.groom.groom import Groom
+from core.mesh.mesh import Mesh
+from core.mesh.roots import Roots
 from core.mesh.skin import Posed, skin_at_rest, skin_posed
 
 FINE, QUICK = (11, 5), (4, 3)  # rows and columns of a vane, at rest and while things move
 
 
 class FeatherPicture(NamedTuple):
-    """A coat as triangles in space, one mesh for each kind of feather: as seen at rest, and while things move."""
+    """A coat as triangles in space, one mesh for each kind of feather: as seen at rest, and while things move.
+
+    rows : of each mesh in `roots`, feather by feather. skin : the pose they were laid for.
+    """
 
     fine: tuple[FeatherMesh, ...]
     quick: tuple[FeatherMesh, ...]
+    rows: tuple[NDArray[np.intp], ...]
+    roots: Roots
+    skin: Posed
 
 
 class Asked(NamedTuple):
@@ -50,12 +58,14 @@ class LiveFeathers:
         self._evaluator = evaluator
         self._plumages: dict[int, object] = {}  # core.feather.coat.plumage.Plumage, whose kernels load with the first
         self._laid: dict[int, tuple[Asked, FeatherPicture]] = {}
+        self._carried: dict[int, tuple[FeatherPicture, Posed, FeatherPicture]] = {}  # the last one, and what it is of
 
     def follow(self, document: Document) -> None:
         """Forget the coats that are gone."""
         alive = {coat.id for coat in document.feathers}
         self._plumages = {k: plumage for k, plumage in self._plumages.items() if k in alive}
         self._laid = {k: laid for k, laid in self._laid.items() if k in alive}
+        self._carried = {k: carried for k, carried in self._carried.items() if k in alive}
 
     def wanted(
         self, document: Document, posed: Callable[[MeshObject], Posed], meshes: Iterable[MeshObject], frame: float
@@ -75,14 +85,29 @@ class LiveFeathers:
     def shown(
         self, document: Document, posed: Callable[[MeshObject], Posed], meshes: Iterable[MeshObject]
     ) -> dict[int, list[FeatherPicture]]:
-        """Pictures by the id of their mesh: those laid on the skin as it now is, be what they were laid for older."""
+        """Pictures by the id of their mesh, be what they were laid for older: on a skin they were not laid for those
+        of moving pictures, carried by it."""
         found: dict[int, list[FeatherPicture]] = {}
         for item in meshes:
             for coat in document.feathers:
                 laid = self._laid.get(coat.id)
-                if coat.mesh_id == item.id and not coat.hidden and laid and laid[0].points is posed(item).points:
-                    found.setdefault(item.id, []).append(laid[1])
+                if coat.mesh_id == item.id and not coat.hidden and laid and _same_faces(laid[0].item.mesh, item.mesh):
+                    found.setdefault(item.id, []).append(self._on(coat.id, laid[1], laid[0].item.mesh, posed(item)))
         return found
+
+    def _on(self, coat_id: int, picture: FeatherPicture, mesh: Mesh, skin: Posed) -> FeatherPicture:
+        """A picture on a skin: as it was laid, or carried."""
+        if skin.points is picture.skin.points:
+            return picture
+        known = self._carried.get(coat_id)
+        if known is not None and known[0] is picture and known[1].points is skin.points:
+            return known[2]
+        from core.feather.coat.carry import carried_meshes
+
+        quick = carried_meshes(picture.quick, picture.rows, mesh, picture.roots, picture.skin, skin)
+        made = picture._replace(fine=quick, quick=quick)
+        self._carried[coat_id] = picture, skin, made
+        return made
 
     def _asked(
         self, document: Document, posed: Callable[[MeshObject], Posed], meshes: Iterable[MeshObject], frame: float
@@ -98,7 +123,7 @@ class LiveFeathers:
             yield Asked(coat, keys_of(document, coat), item, posed(item).points, by_itself)
 
     def _lay(self, asked: Asked, document: Document, frame: float) -> FeatherPicture:
-        from core.feather.coat.picture import coat_meshes
+        from core.feather.coat.picture import coat_meshes, rows_of_meshes
         from core.feather.coat.plumage import Plumage
 
         coat, mesh = asked.coat, asked.item.mesh
@@ -107,4 +132,11 @@ class LiveFeathers:
         still = asked.points is mesh.points
         skin = skin_at_rest(mesh, self._evaluator) if still else skin_posed(mesh, asked.points, self._evaluator)
         laid = plumage.at_frame(coat, asked.keys, mesh, skin, frame, float(document.first_frame))
-        return FeatherPicture(coat_meshes(laid, coat, FINE), coat_meshes(laid, coat, QUICK))
+        rows = tuple(rows for _, rows in rows_of_meshes(laid, coat))
+        return FeatherPicture(
+            coat_meshes(laid, coat, FINE), coat_meshes(laid, coat, QUICK), rows, laid.bed.roots,
+            Posed(asked.points, skin.normals))
+
+
+def _same_faces(one: Mesh, other: Mesh) -> bool:
+    return one is other or (one.corners is other.corners and one.counts is other.counts)

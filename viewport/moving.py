@@ -283,7 +283,7 @@ class Moving:
         target.use()
         maps.bind()
         outline = self.renderer.outline.of(scene)
-        self.renderer.solids.draw(scene, camera, target, {**uniforms, "tap_reach": 0}, outline, options, quick=True)
+        self.renderer.solids.draw(scene, camera, target, {**uniforms, "tap_reach": 0}, outline, options)
 
     def _draw_backdrop(self, scene: Scene, size: tuple[int, int]) -> None:
         """Copy the background, which does not turn with the camera, into the base."""

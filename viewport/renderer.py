@@ -20,7 +20,7 @@ from viewport.near_side import shown_rows
 from viewport.outline import Outline, extent
 from viewport.ribbons import Ribbons, drawn_points, far_to_near
 from viewport.scene import Coat, GuideLines, Scene, direction
-from viewport.solids import PLAIN, Solids
+from viewport.solids import PLAIN, Solids, lit_uniforms
 
 LARGEST_TILE = 4096  # samples on a side
 TILE_STEP = 256  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
@@ -189,12 +189,24 @@ class Renderer:
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0, viewport=target.viewport)
         uniforms = {**prepared.uniforms, "clip_from_world": matrix}
         rows = max(1, SAMPLES_AT_ONCE // width)
-        for bottom in range(0, height, rows):
-            target.scissor = (0, bottom, width, min(rows, height - bottom))
+        bands = [(0, bottom, width, min(rows, height - bottom)) for bottom in range(0, height, rows)]
+        lit = lit_uniforms(scene, camera, uniforms)
+        for band in bands:
+            target.scissor = band
             self.light_maps.bind()
-            self.solids.draw(scene, camera, target, uniforms, self.outline.of(scene), prepared.options, samples)
+            self.solids.fill(scene, target, lit, prepared.options)
             target.scissor = None  # type: ignore[assignment]
-            yield 0.05 * bottom / height
+            yield 0.02 * band[1] / height
+        self.light_maps.bind()
+        for part in self.solids.plumage(target, lit):
+            yield 0.02 + 0.02 * part
+            self.light_maps.bind()
+        for band in bands:
+            target.scissor = band
+            self.light_maps.bind()
+            self.solids.finish(camera, target, lit, self.outline.of(scene), prepared.options, samples)
+            target.scissor = None  # type: ignore[assignment]
+            yield 0.04 + 0.01 * band[1] / height
         drawn = [coat.textures for coat in self.coats] + [guides.textures for guides in self.guides]
         total, before = max(sum(len(order) for order in orders), 1), 0.0
         for textures, order, points in zip(drawn, orders, pieces, strict=True):

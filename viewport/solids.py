@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import moderngl
@@ -34,6 +34,13 @@ def fur_color(look: Look) -> Color:
     return (r, g, b)
 
 
+def lit_uniforms(scene: Scene, camera: Camera, uniforms: dict[str, Any]) -> dict[str, Any]:
+    """What the programs of meshes and feathers are told, beside `uniforms` of camera and light."""
+    depth = max((coat.look.depth for coat in scene.coats), default=1.0)
+    right, up = camera.world_from_camera[:3, 0], camera.world_from_camera[:3, 1]
+    return {**uniforms, "absorption": ABSORPTION * depth, "view_right": right, "view_up": up}
+
+
 class Solids:
     """Buffers and programs of all surfaces of a scene and of the ground."""
 
@@ -61,39 +68,68 @@ class Solids:
         else:
             self.feathers = matched(self.feathers, scene.feathers, made)
 
-    def cast_shadows(self, clip_from_world: NDArray[np.float64], quick: bool = False) -> None:
-        """Draw the depth of all that keeps light off the rest."""
+    def cast_shadows(self, clip_from_world: NDArray[np.float64], quick: bool = False) -> Iterator[None]:
+        """Draw the depth of all that keeps light off the rest, in steps."""
         for mesh in self.meshes:
             if not mesh.surface.ghost:
                 mesh.draw_depth(clip_from_world)
+        yield
         for feathers in self.quick_feathers if quick else self.feathers:
-            feathers.draw_depth(clip_from_world)
+            for part in feathers.slices:
+                feathers.draw_depth(clip_from_world, part)
+                yield
 
     def draw(
         self, scene: Scene, camera: Camera, target: moderngl.Framebuffer, uniforms: dict[str, Any],
-        outline: NDArray[np.float32], options: ViewOptions = PLAIN, samples: int = 1, quick: bool = False,
+        outline: NDArray[np.float32], options: ViewOptions,
     ) -> None:
-        """Draw into color and depth of the target, which were cleared.
+        """Draw all of a moving picture at once into color and depth of the target, which were cleared."""
+        uniforms = lit_uniforms(scene, camera, uniforms)
+        self.fill(scene, target, uniforms, options, quick=True)
+        for _ in self.plumage(target, uniforms, quick=True):
+            pass
+        self.finish(camera, target, uniforms, outline, options, quick=True)
 
-        outline : of the scene, (M, 3). samples : of the target for a pixel, on a side. quick : light vertices alone.
+    def fill(
+        self, scene: Scene, target: moderngl.Framebuffer, uniforms: dict[str, Any], options: ViewOptions,
+        quick: bool = False,
+    ) -> None:
+        """Draw what hides other things, but for feathers.
+
+        uniforms : of :func:`lit_uniforms`. quick : light vertices alone.
+        """
+        self._begin(target)
+        if options.shading != "wire":
+            self._fill(self._solid(), scene, uniforms, options.shading, quick)
+        self._end()
+
+    def plumage(
+        self, target: moderngl.Framebuffer, uniforms: dict[str, Any], quick: bool = False
+    ) -> Iterator[float]:
+        """Draw the feathers, in steps; the done part 0 .. 1. quick : those of moving pictures."""
+        drawn = self.quick_feathers if quick else self.feathers
+        slices = [(feathers, part) for feathers in drawn for part in feathers.slices]
+        for number, (feathers, part) in enumerate(slices):
+            self._begin(target)
+            feathers.draw(uniforms, part)
+            self._end()
+            yield (number + 1) / len(slices)
+
+    def finish(
+        self, camera: Camera, target: moderngl.Framebuffer, uniforms: dict[str, Any], outline: NDArray[np.float32],
+        options: ViewOptions, samples: int = 1, quick: bool = False,
+    ) -> None:
+        """Draw what lies over the rest: edges, the ground, ghosts.
+
+        outline : of the scene, (M, 3). samples : of the target for a pixel, on a side.
         """
         ctx = self.ctx
-        target.use()
-        depth = max((coat.look.depth for coat in scene.coats), default=1.0)
-        right, up = camera.world_from_camera[:3, 0], camera.world_from_camera[:3, 1]
-        uniforms = {**uniforms, "absorption": ABSORPTION * depth, "view_right": right, "view_up": up}
-        ctx.enable(moderngl.DEPTH_TEST)
-        ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
-        solid = [mesh for mesh in self.meshes if not mesh.surface.ghost]
-        if options.shading != "wire":
-            self._fill(solid, scene, uniforms, options.shading, quick)
-        for feathers in self.quick_feathers if quick else self.feathers:
-            feathers.draw(uniforms)
+        self._begin(target)
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         if options.wire or options.shading in ("wire", "lines"):
             color = WIRE if options.shading in ("wire", "lines") else WIRE_OVER
-            for mesh in solid:
+            for mesh in self._solid():
                 mesh.draw_edges(color, uniforms)
         target.depth_mask = False
         if options.grid:
@@ -106,7 +142,18 @@ class Solids:
                 if options.wire or options.shading in ("wire", "lines"):
                     mesh.draw_edges(WIRE_GHOST, uniforms)
         target.depth_mask = True
-        ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._end()
+
+    def _solid(self) -> list[MeshDrawable]:
+        return [mesh for mesh in self.meshes if not mesh.surface.ghost]
+
+    def _begin(self, target: moderngl.Framebuffer) -> None:
+        target.use()
+        self.ctx.enable(moderngl.DEPTH_TEST)
+        self.ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
+
+    def _end(self) -> None:
+        self.ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
 
     @staticmethod
     def _fill(

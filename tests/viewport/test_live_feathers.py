@@ -74,6 +74,23 @@ def test_combed_keys_lay_the_coat_anew_when_the_hand_rests(live, document):
     assert not np.array_equal(after.feathers[0].points, before.feathers[0].points)
 
 
+def test_while_things_move_feathers_are_carried_by_the_skin(live, document):
+    rest = live.update(document, 1001.0).scene
+    turn, way = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], np.float32), np.float32([0.3, 1.0, -0.2])
+    item = document.meshes[0]
+    points = np.ascontiguousarray(item.mesh.points @ turn + way)
+    points.setflags(write=False)
+    moved = document.replace(meshes=(item.replace(mesh=item.mesh.replace(points=points)),))
+    scene = live.update(moved, 1002.0, stroking=True).scene
+    assert of_feathers(live) == []
+    assert scene.feathers == scene.quick_feathers
+    for was, now in zip(rest.quick_feathers, scene.quick_feathers, strict=True):
+        np.testing.assert_allclose(now.points, was.points @ turn + way, atol=1e-4)
+        np.testing.assert_allclose(now.normals, was.normals @ turn, atol=1e-4)
+        assert now.triangles is was.triangles
+    assert live.update(moved, 1002.0, stroking=True).scene.quick_feathers[0].points is scene.quick_feathers[0].points
+
+
 def test_hidden_feathers_are_neither_laid_nor_shown(live, document):
     hidden = set_feathers(document, document.feathers[0].id, hidden=True)
     scene = live.update(hidden, 1001.0).scene

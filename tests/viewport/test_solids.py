@@ -6,15 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from core.camera import project
+from core.camera import frame_points, project
+from core.feather.levels import feather_mesh
+from core.feather.presets import preset_values
 from core.workspace import SHADINGS, ViewOptions
 from tests.viewport.scenes import ball, camera, quad
+from viewport.drawables import feathers
 from viewport.drawables.grid import ground_axes
 from viewport.drawables.mesh import map_colors, triangle_edges
-from viewport.outline import outline_points
 from viewport.renderer import Renderer
 from viewport.scene import Scene
-from viewport.solids import Solids
+from viewport.solids import PLAIN, Solids, lit_uniforms
 
 W, H = 200, 150
 BARE = ViewOptions(grid=False, axes=False)
@@ -169,7 +171,7 @@ def test_quick_light_at_the_vertices_is_that_of_every_sample(ctx):
         target.clear(depth=1.0)
         renderer.light_maps.bind()
         assert isinstance(renderer.solids, Solids)
-        renderer.solids.draw(scene, cam, target, prepared.uniforms, outline_points(scene), quick=quick)
+        renderer.solids.fill(scene, target, lit_uniforms(scene, cam, prepared.uniforms), PLAIN, quick)
         images.append(np.frombuffer(color.read(), np.float32).reshape(H, W, 4).copy())
     assert np.array_equal(images[0][..., 3] > 0.5, images[1][..., 3] > 0.5)
     lit = images[0][..., 3] > 0
@@ -182,3 +184,18 @@ def test_edges_of_triangles_are_found_once():
     triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
     assert triangle_edges(triangles).tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
     assert triangle_edges(np.zeros((0, 3), np.int32)).shape == (0, 2)
+
+
+def test_feathers_are_drawn_a_few_triangles_at_a_time_and_look_the_same(ctx, monkeypatch):
+    mesh = feather_mesh(preset_values("goldfinch-breast"), 0, "vane")
+    scene, cam = Scene(feathers=(mesh,)), frame_points(mesh.points, (0.3, 0.2, -1.0), W / H)
+    target = ctx.framebuffer([ctx.texture((W, H), 4)])
+    renderer, images, counts = Renderer(ctx, shadow_side=128), [], []
+    for at_once in (1 << 20, len(mesh.triangles) // 7):
+        monkeypatch.setattr(feathers, "AT_ONCE", at_once)
+        counts.append(sum(1 for _ in renderer.steps(scene, cam, target, (W, H))))
+        images.append(target.read(components=3, alignment=1))
+    renderer.release()
+    assert np.ptp(np.frombuffer(images[0], np.uint8)) > 50
+    assert images[0] == images[1]
+    assert counts[1] >= counts[0] + 3 * 7  # two maps of shadows and the picture

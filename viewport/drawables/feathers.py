@@ -11,6 +11,7 @@ from core.feather.pieces import FeatherMesh
 from viewport.shaders import program, set_uniforms
 
 PICTURE_UNIT = 8
+AT_ONCE = 1 << 13  # triangles: a few dozen milliseconds in software
 COLUMNS = (
     ("points", "3f", "in_position"), ("normals", "3f", "in_normal"), ("fibres", "3f", "in_fibre"),
     ("colors", "3f", "in_color"), ("light", "4f", "in_light"), ("film", "2f", "in_film"),
@@ -73,26 +74,30 @@ class FeatherDrawable:
         self.mesh = mesh
         return True
 
-    def draw(self, uniforms: dict[str, Any]) -> None:
-        """Draw in light; with the uniforms of lighting.glsl."""
+    @property
+    def slices(self) -> list[tuple[int, int]]:
+        """Triangles (first, how many) that are drawn at once without the window standing still."""
+        count = len(self.mesh.triangles)
+        return [(first, min(AT_ONCE, count - first)) for first in range(0, count, AT_ONCE)]
+
+    def draw(self, uniforms: dict[str, Any], part: tuple[int, int]) -> None:
+        """Draw some triangles in light; with the uniforms of lighting.glsl."""
         optics = self.mesh.optics
         more = {"under": optics.under, "film_index": optics.film_index, "film_spread": optics.film_spread}
-        self._render(self.shaded, {**uniforms, **more})
+        self._render(self.shaded, {**uniforms, **more}, part)
 
-    def draw_depth(self, clip_from_world: np.ndarray) -> None:
-        """Draw depth alone."""
-        self._render(self.depth, {"clip_from_world": clip_from_world})
+    def draw_depth(self, clip_from_world: np.ndarray, part: tuple[int, int]) -> None:
+        """Draw the depth of some triangles alone."""
+        self._render(self.depth, {"clip_from_world": clip_from_world}, part)
 
-    def _render(self, vertices: moderngl.VertexArray, uniforms: dict[str, Any]) -> None:
-        if not len(self.mesh.triangles):
-            return
+    def _render(self, vertices: moderngl.VertexArray, uniforms: dict[str, Any], part: tuple[int, int]) -> None:
         if self.picture is not None:
             self.picture.use(PICTURE_UNIT)
         set_uniforms(vertices.program, {
             **uniforms, "has_picture": self.picture is not None, "picture": PICTURE_UNIT,
             "picture_corner": self.mesh.corner, "picture_extent": self.mesh.extent,
         })  # fmt: skip
-        vertices.render(moderngl.TRIANGLES, vertices=3 * len(self.mesh.triangles))
+        vertices.render(moderngl.TRIANGLES, first=3 * part[0], vertices=3 * part[1])
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""

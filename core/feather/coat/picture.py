@@ -25,11 +25,17 @@ def coat_meshes(laid: Laid, coat: FeatherCoat, grid: tuple[int, int] = (ROWS, CO
 
     grid : rows and columns of a vane, an odd number of columns.
     """
+    return tuple(_worn(laid, rows, worn_values(coat, name), grid) for name, rows in rows_of_meshes(laid, coat))
+
+
+def rows_of_meshes(laid: Laid, coat: FeatherCoat) -> list[tuple[str, NDArray[np.intp]]]:
+    """For each mesh of :func:`coat_meshes` the preset its feathers wear, and their rows, in the order of vertices."""
     worn = load_bird(coat.preset).feathers
     names = np.array([worn["body"], *(worn.get(tract.name, worn["body"]) for tract in coat.tracts)])
-    rows = np.flatnonzero(laid.shown)
+    shown = np.flatnonzero(laid.shown)
+    rows = shown[np.argsort(laid.ids[shown] % VARIANTS, kind="stable")]
     wears = names[laid.bed.tract[rows].astype(np.intp)]
-    return tuple(_worn(laid, rows[wears == name], worn_values(coat, str(name)), grid) for name in np.unique(wears))
+    return [(str(name), rows[wears == name]) for name in np.unique(wears)]
 
 
 def _worn(laid: Laid, rows: NDArray[np.intp], values: Floats, grid: tuple[int, int]) -> FeatherMesh:
