@@ -191,6 +191,7 @@ def test_feathers_are_drawn_a_few_triangles_at_a_time_and_look_the_same(ctx, mon
     scene, cam = Scene(feathers=(mesh,)), frame_points(mesh.points, (0.3, 0.2, -1.0), W / H)
     target = ctx.framebuffer([ctx.texture((W, H), 4)])
     renderer, images, counts = Renderer(ctx, shadow_side=128), [], []
+    renderer.draw(scene, cam, target, (W, H))  # the first picture also makes room
     for at_once in (1 << 20, len(mesh.triangles) // 7):
         monkeypatch.setattr(feathers, "AT_ONCE", at_once)
         counts.append(sum(1 for _ in renderer.steps(scene, cam, target, (W, H))))
@@ -198,4 +199,4 @@ def test_feathers_are_drawn_a_few_triangles_at_a_time_and_look_the_same(ctx, mon
     renderer.release()
     assert np.ptp(np.frombuffer(images[0], np.uint8)) > 50
     assert images[0] == images[1]
-    assert counts[1] >= counts[0] + 3 * 7  # two maps of shadows and the picture
+    assert counts[1] >= counts[0] + 3 * 6  # two maps of shadows and the picture
