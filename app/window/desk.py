@@ -40,7 +40,7 @@ class Desk(QObject):
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.session = session
-        self.jobs = Jobs(self)
+        self.jobs = Jobs(self, self)
         self._listen(session)
         self.keys = KeysAtHand(self)
 

@@ -12,7 +12,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
@@ -20,9 +20,6 @@ from shiboken6 import isValid
 
 from app.window.theme import look_of
 from core.errors import UserError
-
-if TYPE_CHECKING:
-    from app.window.desk import Desk
 
 SHOWN_AFTER = 500  # ms; what is done sooner never appears
 POLL = 0.1  # s between two looks of a waiting worker at whether it was cancelled
@@ -57,6 +54,18 @@ class Job:
         return self.stop.is_set()
 
 
+class Listener(Protocol):
+    """Who is told what jobs came to: a desk. All of it is called on the thread of the window."""
+
+    said: Any  # a signal
+
+    def attempt(self, function: Callable[..., Any], /, *args: Any, **parameters: Any) -> Any:
+        """Call a function; what goes wrong in it is told to the artist."""
+
+    def error(self, error: Exception, details: str = "") -> None:
+        """Tell the artist what went wrong, with a longer text to copy."""
+
+
 class _Bridge(QObject):
     woken = Signal()
 
@@ -64,14 +73,16 @@ class _Bridge(QObject):
 class Jobs(QObject):
     """The jobs of one desk. Everything but the functions themselves runs on the thread of the window.
 
+    listener : is told how they ended. parent : of this object.
+
     changed : a job was started, has got on, was cancelled or has ended.
     """
 
     changed = Signal()
 
-    def __init__(self, desk: Desk) -> None:
-        super().__init__(desk)
-        self._desk = desk
+    def __init__(self, listener: Listener, parent: QObject) -> None:
+        super().__init__(parent)
+        self._listener = listener
         self._jobs: list[Job] = []
         self._news: SimpleQueue[tuple[Job, str, Any]] = SimpleQueue()
         self._own = threading.local()  # `job` is that of the thread
@@ -229,25 +240,26 @@ class Jobs(QObject):
         if job.owner is not None and not isValid(job.owner):
             return
         if what == "done" and not job.stopping:
-            self._desk.attempt(job.done, value)
+            self._listener.attempt(job.done, value)
             return
         error, text = value if what == "failed" else (Cancelled(), "")
         if job.failed is not None:
-            self._desk.attempt(job.failed, error)
+            self._listener.attempt(job.failed, error)
         elif isinstance(error, Cancelled):
-            self._desk.said.emit(str(error) or f"{job.name}: cancelled.")
+            self._listener.said.emit(str(error) or f"{job.name}: cancelled.")
         elif isinstance(error, UserError):
-            self._desk.error(error)
+            self._listener.error(error)
         else:
-            self._desk.error(UserError(f"{job.name} did not work: {error}. This is our fault; copy the details."), text)
+            self._listener.error(
+                UserError(f"{job.name} did not work: {error}. This is our fault; copy the details."), text)
 
 
 class JobsBar(QWidget):
     """Name, bar and Cancel of the job that goes on longest; hidden while nothing takes long."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, jobs: Jobs, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._jobs = desk.jobs
+        self._jobs = jobs
         self.name, self.bar, self.stop = QLabel(), QProgressBar(), QPushButton("Cancel")
         self.bar.setTextVisible(False)
         self.bar.setMaximum(1000)

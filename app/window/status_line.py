@@ -65,7 +65,7 @@ class StatusLine(QWidget):
         line.setSpacing(8)
         line.addWidget(self.words, 1)
         line.addWidget(self.copy)
-        line.addWidget(JobsBar(desk, self))
+        line.addWidget(JobsBar(desk.jobs, self))
         desk.said.connect(self.say)
         desk.failed.connect(self.fail)
         desk.workspace_changed.connect(self._workspace_changed)

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import statistics
 import time
+from collections import deque
+
+LAST = 5  # pieces of work; one that took long for once does not count
 
 
 class Stopwatch:
     """The usual time of the last few pieces of work, in milliseconds."""
 
     def __init__(self) -> None:
-        self.ms = 0.0
+        self._last: deque[float] = deque(maxlen=LAST)
         self._start: float | None = None
+
+    @property
+    def ms(self) -> float:
+        """The median; 0 before any."""
+        return statistics.median(self._last) if self._last else 0.0
 
     def start(self) -> None:
         """The work begins."""
@@ -22,5 +31,5 @@ class Stopwatch:
             return None
         took = 1e3 * (time.perf_counter() - self._start)
         self._start = None
-        self.ms = took if self.ms == 0.0 else 0.7 * self.ms + 0.3 * took
+        self._last.append(took)
         return took

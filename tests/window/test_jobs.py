@@ -193,7 +193,7 @@ def test_thousands_of_reports_from_many_threads_arrive(desk: Desk, qtbot: QtBot)
 
 
 def test_the_bar_shows_what_takes_long_and_cancels_it(desk: Desk, qtbot: QtBot) -> None:
-    bar = JobsBar(desk)
+    bar = JobsBar(desk.jobs)
     qtbot.addWidget(bar)
     assert bar.isHidden()
     desk.jobs.start("Quick", lambda progress, cancelled: 1, lambda result: None)
