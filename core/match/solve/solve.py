@@ -179,6 +179,8 @@ def solve(
     else:
         guesses = [share * max(size) for share in FOCALS]
     found = _best(observations, frames, tracks, size, options, progress, views, guesses)
+    if options.focal is not None and not (options.free_focal or options.nodal) and views.alone.sum() == 0:
+        found = _at_another_focal(found, observations, frames, tracks, size, options, progress, views)
     for _ in range(ROUNDS):  # what bends the pictures of a camera is told over its focal length
         better = _refocused(found, observations)
         if better is None:
@@ -198,6 +200,33 @@ def solve(
         found = found._replace(said=(
             *found.said, f"The shutter reads the picture in {readout:.3f} +- {sigma:.3f} of a frame."))
     return found
+
+
+def _at_another_focal(
+    found: Solution, observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
+    progress: Callable[[str], None], views: Views,
+) -> Solution:
+    """The solve at a focal length far from the one given, where that leaves too much and another leaves far less."""
+    if not _misses(found):
+        return found
+    progress("does another focal length fit?")
+    free = options._replace(focal=None, free_focal=True)
+    try:
+        other = _best(
+            observations, frames, tracks, size, free, progress, views, [share * max(size) for share in FOCALS])
+    except UserError:
+        return found
+    if _misses(other) or _left_out(other) > 0.5 * _left_out(found):
+        return found
+    focal = float(np.exp(other.state.lens[FOCAL]))
+    said = f"The focal length given does not fit these tracks; {focal:.1f} px was found instead."
+    return other._replace(said=(said, *other.said))
+
+
+def _misses(found: Solution) -> bool:
+    """Whether many tracks do not fit, and those that do miss by something that goes on from frame to frame."""
+    part = found.observations.take(found.used)
+    return _left_out(found) > LEFT_OUT and correlation(found.state, part) > WANDERS
 
 
 def _refocused(found: Solution, observations: Observations) -> Views | None:
@@ -265,10 +294,9 @@ def _best(
         other_way = problem.finish(moving) if moving.doubt < np.inf else found
         if _left_out(other_way) < 0.5 * _left_out(found):
             found, start = other_way, moving
-    missing = _left_out(found) > LEFT_OUT and correlation(found.state, found.observations.take(found.used)) > WANDERS
     # a zoom nobody asked for begins on the path of one focal length, which may have led it astray
     unasked = start.zoom and not options.zoom and found.sigma > ASTRAY * found.noise
-    doubtful = start.doubt > ACCEPT or missing or unasked
+    doubtful = start.doubt > ACCEPT or unasked or _misses(found)
     if start.kind == "nodal" or not doubtful or views.alone.any() or len(views.cameras) > 1:
         return found
     if not (options.distortion or options.zoom):
@@ -464,7 +492,7 @@ class _Problem:
             doubt = self._doubt(done.state, self.part)
             if best is None or doubt < best.doubt * (GAIN if _richness(columns, zoom) > best.richness else 1.0):
                 cameras = Cameras(done.state, np.ones(len(self.keys), bool), np.ones(self.tracks, bool))
-                best = _Start(doubt, "nodal", cameras, columns, zoom, self._changed(done.state, columns, zoom, free))
+                best = _Start(doubt, "nodal", cameras, columns, zoom, ())
         return best
 
     def _lenses(self, free: bool) -> list[tuple[tuple[int, ...], bool]]:
@@ -483,15 +511,16 @@ class _Problem:
         tries = [*((columns, False) for columns in models), *zooms]
         return [one for k, one in enumerate(tries) if one not in tries[:k]]
 
-    def _changed(self, state: State, columns: tuple[int, ...], zoom: bool, free: bool) -> tuple[str, ...]:
+    def _changed(self, state: State, start: _Start) -> tuple[str, ...]:
         """Words where more was found than was asked for."""
         said = []
         focal = float(np.exp(state.lens[FOCAL]))
-        if zoom and not self.options.zoom:
+        asked = self.options.focal is None or self.options.free_focal
+        if start.zoom and not self.options.zoom:
             said.append("The focal length changes over the shot: it was solved with a zoom, which nobody asked for.")
-        elif FOCAL in columns and not free:
+        elif FOCAL in start.lens_columns and not asked:
             said.append(f"The focal length given does not fit these tracks; {focal:.1f} px was found instead.")
-        if K1 in columns and not self.options.distortion:
+        if K1 in start.lens_columns and not self.options.distortion and abs(state.lens[K1]) > REBENT:
             said.append(f"The lens bends lines: k1 {state.lens[K1]:+.4f} was found, which nobody asked for.")
         return tuple(said)
 
@@ -531,7 +560,7 @@ class _Problem:
                 other = grower.adjusted(other, columns, tied)
                 doubt = self._key_doubt(other)
             if best is None or doubt < best.doubt * (GAIN if _richness(columns, zoom) > best.richness else 1.0):
-                best = _Start(doubt, "free", other, columns, zoom, self._changed(other.state, columns, zoom, free))
+                best = _Start(doubt, "free", other, columns, zoom, ())
         assert best is not None
         return best
 
@@ -590,7 +619,7 @@ class _Problem:
         sigma = max(float(np.sqrt((final**2).sum() / max(1, freedom))), exact)
         return Solution(
             state, self.frames, known, held, used, observations, start.kind, self.noise, sigma, tuple(self.keys),
-            self.size, free, start.said, self.pixel, self.views, self.noise_told,
+            self.size, free, (*self._changed(state, start), *start.said), self.pixel, self.views, self.noise_told,
         )
 
     def _spread(self, state: State, observations: Observations, used: Flags) -> float:
