@@ -69,10 +69,15 @@ def join_pieces(track: Track, pieces: list[Piece]) -> Track:
 def _between(
     first: int, last: int, keys: dict[int, list[float]], forward: Piece | None, backward: Piece | None
 ) -> dict[int, NDArray[np.float64]]:
-    """Frames from one key to the next. Where one misses the other's key, it is trusted less the further it went."""
+    """Frames from one key to the next. Where one misses the other's key, it is trusted less the further it went.
+
+    One that was lost on the way is no better than the other: what that misses by is held against both.
+    """
     ahead = forward.rows() if forward is not None else {}
     back = backward.rows() if backward is not None else {}
-    drift = [_drift(ahead.get(last), keys[last]), _drift(back.get(first), keys[first])]
+    missed = [_drift(ahead.get(last), keys[last]), _drift(back.get(first), keys[first])]
+    most = max((gap for gap in missed if gap is not None), default=0.0)
+    drift = [most if gap is None else gap for gap in missed]
     made = {}
     for frame in range(first + 1, last):
         way = (frame - first) / (last - first)
@@ -89,10 +94,10 @@ def _between(
     return made
 
 
-def _drift(arrived: NDArray[np.float64] | None, key: list[float]) -> float:
-    """Variance in px^2 that a piece missed the other key by beyond what it foretold; 0 when it never came there."""
+def _drift(arrived: NDArray[np.float64] | None, key: list[float]) -> float | None:
+    """Variance in px^2 that a piece missed the other key by beyond what it foretold; None when it never came there."""
     if arrived is None:
-        return 0.0
+        return None
     return max(0.0, float(((arrived[:2] - key) ** 2).sum()) / 2.0 - (arrived[2] + arrived[4]) / 2.0)
 
 

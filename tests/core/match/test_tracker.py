@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from core.match.join import Piece, join_pieces
 from core.match.track import TrackSettings, keyed_track
 from core.match.tracker import Tracking
 from tests.core.match.plates import frame, place, texture
@@ -206,6 +207,19 @@ def test_motion_blur_is_followed():
         truth = np.array([place(POINTS[4], 4 * k) for k in track.frames])
         assert len(track.frames) == 8
         assert np.abs(track.points - truth).max() < 0.1
+
+
+def test_a_piece_that_was_lost_before_the_other_key_is_not_trusted_as_if_it_had_arrived():
+    track = keyed_track(1, "t", np.array([[0, 10.0, 10.0], [4, 14.0, 10.0]]))
+    sure = np.array([0.01, 0.0, 0.01])
+    forward, backward = Piece(1, 0, 1, sure), Piece(1, 4, -1, sure)
+    for k in range(1, 5):  # comes 2 px below the other key
+        forward.add(k, np.array([10.0 + k, 10.0 + 0.5 * k]), sure, 0.5 * sure, 0.9)
+    for k in (3, 2):  # is lost then
+        backward.add(k, np.array([10.0 + k, 10.0]), sure, 0.5 * sure, 0.9)
+    made = join_pieces(track, [forward, backward])
+    assert made.points[2, 1] == pytest.approx(10.5)  # half way, half of the 1 px between them
+    assert made.covariance[2, 2] > 0.2
 
 
 def test_a_track_with_no_key_on_these_frames_stays_as_it_was_and_the_others_are_followed():
