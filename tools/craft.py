@@ -3,16 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
-from core.document import Document
+from core.document import Document, MeshObject
+from core.evaluator import Evaluator
+from core.groom.groom import Groom
+from core.history import History
+from core.workspace import Workspace
 from tools.tool import Ground, Sight, Tool
-
-if TYPE_CHECKING:
-    from tools.session import Session
 
 G = TypeVar("G", bound=Ground)
 V = TypeVar("V")
+
+
+class Work(Protocol):
+    """What a craft sees of a session.
+
+    history : its current document is the one to edit. workspace : the frame, what is respected, what is active.
+    evaluator : remembers what is made of the document. groom, mesh : worked on; UserError when there is none.
+    waits : a stroke begins only when what it collides with is there.
+    """
+
+    @property
+    def history(self) -> History[Document]: ...
+    @property
+    def workspace(self) -> Workspace: ...
+    @property
+    def evaluator(self) -> Evaluator: ...
+    @property
+    def groom(self) -> Groom: ...
+    @property
+    def mesh(self) -> MeshObject: ...
+    @property
+    def waits(self) -> bool: ...
 
 
 class Craft(Protocol[G, V]):
@@ -27,7 +50,7 @@ class Craft(Protocol[G, V]):
     first: ClassVar[str]
     edits: ClassVar[tuple[str, ...]]
 
-    def grounds(self, session: Session, sight: Sight, tool: Tool[Any]) -> tuple[G, ...]:
+    def grounds(self, session: Work, sight: Sight, tool: Tool[Any]) -> tuple[G, ...]:
         """What strokes would work on, one for each side of symmetry; the same objects while nothing changed.
 
         Raises
@@ -49,7 +72,7 @@ class Craft(Protocol[G, V]):
         """As :meth:`shown`, at release."""
         ...
 
-    def place(self, session: Session, ground: G) -> dict[str, Any]:
+    def place(self, session: Work, ground: G) -> dict[str, Any]:
         """Fields of the workspace that a replay needs to find the same ground."""
         ...
 
@@ -61,6 +84,6 @@ class Craft(Protocol[G, V]):
         """Make what :meth:`ready` asks for."""
         ...
 
-    def preparation(self, session: Session) -> Callable[[], object] | None:
+    def preparation(self, session: Work) -> Callable[[], object] | None:
         """What a press now would wait for, to be called on any thread; None when nothing is. Handed out once."""
         ...

@@ -7,22 +7,38 @@ back. What the matter is, and what becomes of it, the craft of the tool knows (:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from threading import Thread
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 
 from core.document import Document
 from core.errors import UserError
 from core.overlay import Circle, Overlays
-from tools.craft import Craft
+from tools.craft import Craft, Work
 from tools.pen import Pen, PenSettings
+from tools.registry import Registry
 from tools.ring import RingParams, ring_radius
 from tools.tool import Ground, NamesStep, Picks, Pointer, Sight, Stroke, Tool
 
-if TYPE_CHECKING:
-    from tools.session import Session
+
+class Owner(Work, Protocol):
+    """The session a hand belongs to.
+
+    tools : there are. tool : in the hand. A stroke is shown by `preview` while it goes on, made a named step by
+    `commit`, or given up by `cancel`; `remember` keeps parameters that it picked.
+    """
+
+    @property
+    def tools(self) -> Registry: ...
+    @property
+    def tool(self) -> Tool[Any]: ...
+    def set_workspace(self, **changes: Any) -> None: ...
+    def preview(self, document: Document) -> None: ...
+    def commit(self, name: str, document: Document) -> None: ...
+    def cancel(self) -> None: ...
+    def remember(self, name: str, params: Mapping[str, Any]) -> None: ...
 
 
 class StrokeRecord(NamedTuple):
@@ -47,7 +63,7 @@ class Hand:
     pen : settings of the pen. recorded : called with every finished stroke; what records macros sets it.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Owner) -> None:
         self.session = session
         self.waits = True
         self.pen = PenSettings()

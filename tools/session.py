@@ -138,6 +138,11 @@ class Session:
         return self.tool_named(next(name for name in (*wanted, *names) if name in names))
 
     @property
+    def waits(self) -> bool:
+        """True when strokes begin only once what they collide with is there (see :class:`tools.hand.Hand`)."""
+        return self.hand.waits
+
+    @property
     def mesh(self) -> MeshObject:
         """The mesh that the pose craft works on: the first with a rig where none is chosen or the chosen one is gone.
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +22,13 @@ from core.mesh.distance_field import DistanceField
 from core.posed import field_at, field_known, skin_at
 from core.transform import normalized
 from core.workspace import Respect
+from tools.craft import Work
 from tools.map_edits import map_to_paint, paint_map
 from tools.posed_guides import BackToRest, in_pose
 from tools.respect import Edits, respected, restored
 from tools.screen import Screen
 from tools.skin_ground import SkinGround
 from tools.tool import Hit, Pointer, Sight, Tool
-
-if TYPE_CHECKING:
-    from tools.session import Session
 
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])  # across the object's own X = 0 plane
 
@@ -146,10 +144,10 @@ class GroomCraft:
         self._known: tuple[tuple[Any, ...], tuple[GroomGround, ...]] | None = None
         self._prepared: tuple[Any, ...] | None = None  # what was last handed out to be prepared
 
-    def grounds(self, session: Session, sight: Sight, tool: Tool[Any]) -> tuple[GroomGround, ...]:
+    def grounds(self, session: Work, sight: Sight, tool: Tool[Any]) -> tuple[GroomGround, ...]:
         """The groom on one or both sides; UserError when there is none or something is locked."""
         workspace, document, groom = session.workspace, session.history.current, session.groom
-        item, waits = mesh_to_edit(document, groom), session.hand.waits
+        item, waits = mesh_to_edit(document, groom), session.waits
         key = (
             groom, item, workspace.frame, workspace.respect, sight.camera, sight.width, sight.height, document.unit,
             tool.at_rest, tool.edits, waits,
@@ -191,7 +189,7 @@ class GroomCraft:
 
     shown = document
 
-    def place(self, session: Session, ground: GroomGround) -> dict[str, Any]:
+    def place(self, session: Work, ground: GroomGround) -> dict[str, Any]:
         """The groom, the frame and what is respected."""
         return {"groom": ground.groom.id, "frame": ground.frame, "respect": ground.respect}
 
@@ -203,7 +201,7 @@ class GroomCraft:
         """Make what to collide with."""
         field_at(ground.item, ground.frame, ground.evaluator)
 
-    def preparation(self, session: Session) -> Callable[[], object] | None:
+    def preparation(self, session: Work) -> Callable[[], object] | None:
         """The making of what to collide with at the present frame and at rest."""
         frame, evaluator = session.workspace.frame, session.evaluator
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +17,9 @@ from core.image.plate import Plate
 from core.image.plate_view import pixels_per_pixel, plate_points, plate_size, view_points
 from core.match.outline import Mask
 from core.match.track import PlaneTrack, Track
+from tools.craft import Work
 from tools.match_edits import place_at, shown_plate
 from tools.tool import Ground, Pointer, Sight, Tool
-
-if TYPE_CHECKING:
-    from tools.session import Session
 
 Array = NDArray[np.float64]
 REACH = 10.0  # pixels of the view from a track that a press takes hold of it
@@ -79,7 +77,7 @@ class MatchCraft:
     def __init__(self) -> None:
         self._known: tuple[tuple[Any, ...], tuple[MatchGround, ...]] | None = None
 
-    def grounds(self, session: Session, sight: Sight, tool: Tool[Any]) -> tuple[MatchGround, ...]:
+    def grounds(self, session: Work, sight: Sight, tool: Tool[Any]) -> tuple[MatchGround, ...]:
         """The plate that is shown; UserError when there is none or it is locked."""
         document = session.history.current
         plate = shown_plate(document)
@@ -110,7 +108,7 @@ class MatchCraft:
         """As :meth:`shown`."""
         return self.shown(document, tool, ground, matter)
 
-    def place(self, session: Session, ground: MatchGround) -> dict[str, Any]:
+    def place(self, session: Work, ground: MatchGround) -> dict[str, Any]:
         """The frame."""
         return {"frame": session.workspace.frame}
 
@@ -121,7 +119,7 @@ class MatchCraft:
     def wait(self, ground: MatchGround) -> None:
         """Nothing to wait for."""
 
-    def preparation(self, session: Session) -> Callable[[], object] | None:
+    def preparation(self, session: Work) -> Callable[[], object] | None:
         """Nothing to prepare."""
         return None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,10 @@ from core.pose.synthesis import pose_at
 from core.posed import held_points, skin_at
 from core.record import freeze
 from core.workspace import Respect
+from tools.craft import Work
 from tools.pose_edits import add_sculpt, same_pose, sculpt_name
 from tools.skin_ground import SkinGround
 from tools.tool import Hit, Sight, Tool
-
-if TYPE_CHECKING:
-    from tools.session import Session
 
 Points = NDArray[np.float32]
 Way = Literal["topology", "axis"]
@@ -105,7 +103,7 @@ class PoseCraft:
     def __init__(self) -> None:
         self._known: tuple[tuple[Any, ...], tuple[PoseGround, ...]] | None = None
 
-    def grounds(self, session: Session, sight: Sight, tool: Tool[Any]) -> tuple[PoseGround, ...]:
+    def grounds(self, session: Work, sight: Sight, tool: Tool[Any]) -> tuple[PoseGround, ...]:
         """The mesh on one or both sides; UserError when it is locked, hidden, or at rest and would be sculpted."""
         workspace, item, evaluator = session.workspace, session.mesh, session.evaluator
         if item.rig is None:
@@ -161,7 +159,7 @@ class PoseCraft:
             changed = with_mesh(changed, item.replace(rig=rig, correctives=made.correctives))
         return changed
 
-    def place(self, session: Session, ground: PoseGround) -> dict[str, Any]:
+    def place(self, session: Work, ground: PoseGround) -> dict[str, Any]:
         """The mesh, the frame and the symmetry."""
         return {"mesh": ground.item.id, "frame": ground.frame, "respect": ground.respect}
 
@@ -172,7 +170,7 @@ class PoseCraft:
     def wait(self, ground: PoseGround) -> None:
         """Nothing to wait for."""
 
-    def preparation(self, session: Session) -> Callable[[], object] | None:
+    def preparation(self, session: Work) -> Callable[[], object] | None:
         """What brushes know of the mesh, so that the first dab does not wait for it."""
         try:
             mesh, evaluator = session.mesh.mesh, session.evaluator
@@ -181,7 +179,7 @@ class PoseCraft:
         return None if evaluator.knows(sculpt_surface, mesh) else lambda: evaluator.get(sculpt_surface, mesh)
 
 
-def _sides(session: Session, item: MeshObject, rig: Rig, sight: Sight, way: Way) -> tuple[PoseGround, ...]:
+def _sides(session: Work, item: MeshObject, rig: Rig, sight: Sight, way: Way) -> tuple[PoseGround, ...]:
     workspace, evaluator = session.workspace, session.evaluator
     frame, respect = workspace.frame, workspace.respect
     pose = item.pose if item.pose is not None else evaluator.get(_pose_of_clip, rig, frame=frame)
