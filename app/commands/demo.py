@@ -85,7 +85,7 @@ def _pose(folder: Path, as_json: bool) -> None:
              for layer in item.correctives.layers for s in layer.space.samples]
     report.done(
         {"poses": poses, "outputs": outputs, "seconds": report.seconds},
-        [f"an arm and a face with the poses {', '.join(poses)}:", *outputs],
+        [f"an arm and a face with the poses {', '.join(poses)}:", *outputs, f"the window opens them: filoplume {project}"],
     )
 
 
