@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from core.document import Document, find_feathers, find_mesh, free_id, keys_of, with_feathers, with_groom
 from core.errors import UserError
@@ -18,6 +18,7 @@ from core.feather.coat.plumage import Plumage
 from core.feather.coat.proxy import demoted, keyed, promoted
 from core.feather.coat.worn import for_all, worn_preset
 from core.feather.presets import preset_values
+from core.groom.groom import Groom
 from core.record import freeze
 from core.value import Constant, Value, constant
 
@@ -123,6 +124,70 @@ def add_placement(document: Document, coat_id: int, placement: Placement) -> Doc
     return set_feathers(document, coat_id, placements=(*coat.placements, placement))
 
 
+def set_placement(document: Document, coat_id: int, number: int, **changes: Any) -> Document:
+    """The document with fields of one placement of a coat changed; feathers of the others stay what they are.
+
+    Raises
+    ------
+    UserError
+        There is no such placement, or a value is impossible.
+    """
+    coat = _free(document, coat_id)
+    if not 0 <= number < len(coat.placements):
+        raise UserError(f"{coat.name} has {len(coat.placements)} placements; there is no number {number}.")
+    try:
+        made = coat.placements[number].replace(**changes)
+    except (ValueError, TypeError) as error:
+        raise UserError(f"Feathers cannot be set so: {error}.") from error
+    placements = (*coat.placements[:number], made, *coat.placements[number + 1:])
+    return set_feathers(document, coat_id, placements=placements)
+
+
+def remove_placement(document: Document, coat_id: int, number: int) -> Document:
+    """The document without the feathers of one placement.
+
+    An empty one keeps its place before others, for ids of feathers come from it; at the end it goes.
+    """
+    emptied = set_placement(document, coat_id, number, kind="rows", count=0, hand=None, density_map=None, tract=None)
+    placements = find_feathers(emptied, coat_id).placements
+    while placements and not placements[-1].count and placements[-1].hand is None:
+        placements = placements[:-1]
+    return set_feathers(emptied, coat_id, placements=placements)
+
+
+def remove_tract(document: Document, coat_id: int, name: str) -> Document:
+    """The document without a tract; placements that kept to it are no longer held."""
+    coat = _free(document, coat_id)
+    freed = tuple(p.replace(tract=None) if p.tract == name else p for p in coat.placements)
+    kept = tuple(tract for tract in coat.tracts if tract.name != name)
+    return set_feathers(document, coat_id, placements=freed, tracts=kept)
+
+
+def tract_of_keys(document: Document, coat_id: int, keys: Collection[int], name: str) -> Document:
+    """The document with a band of skin from key to key, by ids of the guides, as wide as they stand apart at most."""
+    coat = _free(document, coat_id)
+    roots = _roots(document, coat, keys)
+    if len(roots) < 2:
+        raise UserError("Select two or more keys along the middle of the tract.")
+    middle = roots - roots.mean(axis=0)
+    line = roots[np.argsort(middle @ np.linalg.svd(middle, full_matrices=False)[2][0], kind="stable")]
+    width = float(np.linalg.norm(np.diff(line, axis=0), axis=1).max())
+    others = tuple(tract for tract in coat.tracts if tract.name != name)
+    return add_tract(set_feathers(document, coat_id, tracts=others), coat_id, name, line, width)
+
+
+def strokes_of_keys(document: Document, coat_id: int, keys: Collection[int]) -> Document:
+    """The document with a stroke along each of the keys, by ids of the guides, and the coat following its strokes."""
+    coat = _free(document, coat_id)
+    rows = _rows(document, coat, keys)
+    if not len(rows):
+        raise UserError("Select the keys whose direction the feathers are to follow.")
+    guides = _keys(document, coat).guides
+    for row in rows:
+        document = add_stroke(document, coat_id, guides.points[row])
+    return document
+
+
 def add_tract(document: Document, coat_id: int, name: str, line: ArrayLike, width: float) -> Document:
     """The document with a tract drawn on a coat: `line` (P, 3) on the skin at rest, `width` in metres."""
     coat = _free(document, coat_id)
@@ -165,6 +230,21 @@ def key_feather(
 def demote_feather(document: Document, coat_id: int, feather: int) -> Document:
     """The document with a feather given back to the keys of its coat."""
     return with_feathers(document, demoted(_free(document, coat_id), feather))
+
+
+def _keys(document: Document, coat: FeatherCoat) -> Groom:
+    groom = keys_of(document, coat)
+    if groom is None:
+        raise UserError(f"{coat.name} has no keys; plant guides on its mesh and make them its keys.")
+    return groom
+
+
+def _rows(document: Document, coat: FeatherCoat, keys: Collection[int]) -> NDArray[np.intp]:
+    return np.flatnonzero(np.isin(_keys(document, coat).guides.ids, list(keys)))
+
+
+def _roots(document: Document, coat: FeatherCoat, keys: Collection[int]) -> NDArray[np.float64]:
+    return np.asarray(_keys(document, coat).guides.points[_rows(document, coat, keys)][:, 0], np.float64)
 
 
 def _free(document: Document, coat_id: int) -> FeatherCoat:

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
+from app.window.ask_text import ask_text
 from app.window.commands import Command, Window
 from app.window.desk import Desk
 from app.window.jobs import Asked, Progress
+from app.window.window_commands import shown_panels
 from core.document import MeshObject, feathers_of
 from core.errors import UserError
-from core.feather.presets import bird_names
+from core.feather.presets import bird_names, load_bird
 from tools.scene import active_mesh
 
 if TYPE_CHECKING:
@@ -63,6 +65,43 @@ def _remove(window: Window) -> None:
         window.desk.edit("Remove feathers", remove_feathers, coat.id)
 
 
+def _draw_tract(window: Window) -> None:
+    from tools.feather_edits import tract_of_keys
+
+    desk = window.desk
+    coat, groom = feathers_of(desk.document, desk.groom), desk.groom
+    if coat is None or groom is None:
+        return
+    keys = groom.guides.ids[groom.guides.selected].tolist()
+    parts = ", ".join(name for name in load_bird(coat.preset).feathers if name != "body")
+    ask_text(
+        window, "Tract along the selected keys", f"Its name. {parts} wear feathers of their own:",
+        lambda name: desk.edit("Tract along keys", tract_of_keys, coat.id, keys, name.strip() or "tract"))
+
+
+def _remove_tract(window: Window) -> None:
+    from tools.feather_edits import remove_tract
+
+    coat = feathers_of(window.desk.document, window.desk.groom)
+    if coat is not None and coat.tracts:
+        window.desk.edit("Remove tract", remove_tract, coat.id, coat.tracts[-1].name)
+
+
+def _draw_direction(window: Window) -> None:
+    from tools.feather_edits import strokes_of_keys
+
+    desk = window.desk
+    coat, groom = feathers_of(desk.document, desk.groom), desk.groom
+    if coat is not None and groom is not None:
+        keys = groom.guides.ids[groom.guides.selected].tolist()
+        desk.edit("Direction along keys", strokes_of_keys, coat.id, keys)
+
+
+def _edit_feather(window: Window) -> None:
+    if "feather" not in shown_panels(window.desk.workspace.panels):
+        window.toggle_panel("feather")
+
+
 def _needs_mesh(desk: Desk) -> str | None:
     return None if desk.session.document.meshes else "There is no mesh yet: open or import one first."
 
@@ -71,6 +110,18 @@ def _needs_feathers(desk: Desk) -> str | None:
     if feathers_of(desk.document, desk.groom) is not None:
         return None
     return "No feathers are chosen: dress a mesh with feathers, or choose their keys in the scene."
+
+
+def _needs_selected(desk: Desk) -> str | None:
+    if (why := _needs_feathers(desk)) is not None:
+        return why
+    chosen = desk.groom is not None and bool(desk.groom.guides.selected.any())
+    return None if chosen else "No keys are selected: choose some with the select tool or the lasso."
+
+
+def _needs_tract(desk: Desk) -> str | None:
+    coat = feathers_of(desk.document, desk.groom)
+    return None if coat is not None and coat.tracts else "There is no tract: draw one along selected keys first."
 
 
 def _are_hidden(desk: Desk) -> bool:
@@ -94,4 +145,24 @@ FEATHER_COATS: tuple[Command, ...] = (
         "Takes the feathers off the active mesh and leaves the groom of their keys.",
         _remove, "tools.feather_edits.remove_feathers", "document", "Remove feathers", _needs_feathers,
         icon="minus", words="delete bird plumage coat"),
+    Command(
+        "feathers.edit", "Edit the feather",
+        "Opens the editor of one feather beside the coat: outline, dials and every attribute.",
+        _edit_feather, "tools.feather_edits.set_attributes", enabled=_needs_feathers,
+        icon="feather", words="editor attributes shape outline barbs dials"),
+    Command(
+        "feathers.tract", "Tract along selected keys",
+        "Makes a band of skin from selected key to key, which placements may keep to.",
+        _draw_tract, "tools.feather_edits.tract_of_keys", "document", "Tract along keys", _needs_selected,
+        words="pteryla band region wing tail back part"),
+    Command(
+        "feathers.remove_tract", "Remove the last tract",
+        "Takes the last drawn tract away; feathers that kept to it are set everywhere.",
+        _remove_tract, "tools.feather_edits.remove_tract", "document", "Remove tract", _needs_tract,
+        words="delete pteryla band region"),
+    Command(
+        "feathers.direction", "Direction along selected keys",
+        "Lets all feathers follow strokes along the selected keys, instead of every single key.",
+        _draw_direction, "tools.feather_edits.strokes_of_keys", "document", "Direction along keys", _needs_selected,
+        words="orientation stroke flow comb"),
 )

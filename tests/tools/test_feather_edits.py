@@ -8,6 +8,7 @@ from core.errors import UserError
 from core.evaluator import Evaluator
 from core.feather.attributes import ATTRIBUTES, COLUMNS
 from core.feather.coat.coat import Placement
+from core.feather.coat.place import place_feathers
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.worn import worn_preset, worn_values
 from core.feather.presets import preset_values
@@ -82,6 +83,41 @@ def test_attributes_and_dials_of_a_coat_shape_its_feathers_and_go_back(document)
     worn = worn_values(made.feathers[0], "goldfinch-breast")
     assert [ATTRIBUTES[k].name for k in np.flatnonzero(worn != body)] == ["vaneCupRight"]
     assert worn_values(edits.reset_attributes(made, coat.id).feathers[0], "goldfinch-breast") is body
+
+
+def test_placements_are_changed_and_taken_away_and_ids_of_the_others_stay(document, evaluator):
+    coat = document.feathers[0]
+    mixed = edits.add_placement(document, coat.id, Placement(kind="even", count=12))
+    mixed = edits.set_placement(mixed, coat.id, 1, count=9, seed=3)
+    assert [(p.kind, p.count, p.seed) for p in mixed.feathers[0].placements] == [("rows", 60, 0), ("even", 9, 3)]
+    ids = place_feathers(mixed.feathers[0], document.meshes[0].mesh, (), evaluator).ids
+    fewer = edits.remove_placement(mixed, coat.id, 0).feathers[0]
+    np.testing.assert_array_equal(place_feathers(fewer, document.meshes[0].mesh, (), evaluator).ids, ids[60:])
+    assert len(edits.remove_placement(mixed, coat.id, 1).feathers[0].placements) == 1
+    with pytest.raises(UserError, match="no number 7"):
+        edits.set_placement(document, coat.id, 7, count=1)
+    with pytest.raises(UserError, match="field_map"):
+        edits.set_placement(document, coat.id, 0, kind="field")
+
+
+def test_keys_draw_tracts_and_directions(document):
+    coat, guides = document.feathers[0], document.grooms[0].guides
+    chosen = guides.ids[[0, 3, 5]]
+    made = edits.tract_of_keys(document, coat.id, chosen, "back")
+    held = edits.set_placement(made, coat.id, 0, tract="back")
+    tract = held.feathers[0].tracts[0]
+    assert {tuple(point) for point in tract.line} == {tuple(point) for point in guides.points[[0, 3, 5], 0]}
+    assert tract.width > 0.0
+    free = edits.remove_tract(held, coat.id, "back").feathers[0]
+    assert free.tracts == ()
+    assert free.placements[0].tract is None
+    along = edits.strokes_of_keys(document, coat.id, chosen[:1]).feathers[0]
+    assert along.direction == "strokes"
+    np.testing.assert_array_equal(along.strokes[0].points, guides.points[0])
+    with pytest.raises(UserError, match="two or more keys"):
+        edits.tract_of_keys(document, coat.id, chosen[:1], "back")
+    with pytest.raises(UserError, match="Select the keys"):
+        edits.strokes_of_keys(document, coat.id, [])
 
 
 def test_a_coat_becomes_a_feather_of_another_bird(document):

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
@@ -14,12 +15,13 @@ from app.window.commands import Window
 from app.window.craft_panels import CoatPanel
 from app.window.desk import Desk
 from app.window.outliner import Outliner
-from core.document import Document, MeshObject
+from core.document import Document, MeshObject, with_groom
 from core.value import constant
 from tests.core.feather.coat.bodies import egg
 from tools.session import Session
 
 COUNT = 60
+NAMED = {command.name: command for command in feather_coats.FEATHER_COATS}
 
 
 @pytest.fixture
@@ -72,7 +74,7 @@ def test_deleting_the_keys_takes_their_feathers_too(desk: Desk, qtbot: QtBot) ->
 
 def test_commands_hide_and_remove_what_the_keys_at_hand_hold(desk: Desk) -> None:
     window = cast(Window, SimpleNamespace(desk=desk))
-    dress, hide, remove = feather_coats.FEATHER_COATS
+    dress, hide, remove = (NAMED[f"feathers.{name}"] for name in ("dress", "hide", "remove"))
     assert dress.enabled(desk) is None
     assert hide.checked is not None
     for hidden in (True, False):
@@ -83,3 +85,23 @@ def test_commands_hide_and_remove_what_the_keys_at_hand_hold(desk: Desk) -> None
     assert desk.document.feathers == ()
     assert hide.enabled(desk) is not None
     assert desk.groom is not None
+
+
+def test_selected_keys_give_tracts_and_directions(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    window = cast(Window, SimpleNamespace(desk=desk))
+    tract, gone, direction = (NAMED[f"feathers.{name}"] for name in ("tract", "remove_tract", "direction"))
+    assert tract.enabled(desk) is not None
+    assert gone.enabled(desk) is not None
+    groom = desk.groom
+    assert groom is not None
+    selected = np.arange(len(groom.guides)) < 3
+    desk.edit("Select", with_groom, groom.replace(guides=groom.guides.replace(selected=selected)))
+    monkeypatch.setattr(feather_coats, "ask_text", lambda parent, title, label, done: done("back"))
+    tract.run(window)
+    assert [made.name for made in desk.document.feathers[0].tracts] == ["back"]
+    assert desk.session.history.undo_name == tract.undo
+    gone.run(window)
+    assert desk.document.feathers[0].tracts == ()
+    direction.run(window)
+    assert len(desk.document.feathers[0].strokes) == 3
+    assert desk.session.history.undo_name == direction.undo

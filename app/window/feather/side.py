@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidg
 from app.window.desk import Desk
 from app.window.feather.attribute_list import AttributeList
 from app.window.feather.canvas import FlatCanvas, FlatFeather
+from app.window.feather.placements import PlacementList
 from app.window.feather.solid import Draw, SolidView
 from app.window.fields.choice_bar import ChoiceBar
 from app.window.fields.number_bar import NumberBar
@@ -86,6 +87,7 @@ class FeatherSide(QWidget):
             for dial in DIALS
         }
         self.attributes = AttributeList()
+        self.placements = PlacementList(desk)
         self._asked: tuple[object, ...] = ()
         self._busy = False
         self._lay_out(memory)
@@ -119,6 +121,7 @@ class FeatherSide(QWidget):
         other = _rows((self.other, self.blend))
         other.layout().addWidget(self.told)  # type: ignore[union-attr]
         below.add(Section("Another feather", other, memory, "feather other"))
+        below.add(Section("Placement", self.placements, memory, "feather placement"))
         below.add(Section("Attributes", self.attributes, memory, "feather attributes"))
         parts = QSplitter(Qt.Orientation.Vertical)
         parts.setChildrenCollapsible(False)
@@ -162,6 +165,7 @@ class FeatherSide(QWidget):
             self.canvas.show_feather(None)
             self.solid.show_mesh(None)
             self.told.setText("")
+            self.placements.show_coat(None, ())
             self._asked = ()
             return
         parts = ["body", *(name for name in load_bird(coat.preset).feathers if name != "body")]
@@ -177,6 +181,7 @@ class FeatherSide(QWidget):
             bar.set_value(turned.get(name, 0.0))
         groom = self.desk.groom
         maps = () if groom is None else tuple(item.name for item in groom.maps)
+        self.placements.show_coat(coat, maps)
         setting = Setting(self.desk.document.unit, self.desk.workspace.frame, NAMES, maps)
         preset = worn_preset(coat, self.part.value())
         plain = worn_values(coat.replace(dials=()), preset)  # bars show what is set, not what the dials make of it

@@ -130,3 +130,19 @@ def test_an_expression_may_shape_the_feather(side: FeatherSide) -> None:
     side.attributes.edited.emit("vaneCupLeft", constant(0.5, "a map"), True)
     item = side.desk.document.feathers[0].attributes[0]
     assert (item.name, item.value.map) == ("vaneCupLeft", "a map")
+
+
+def test_placements_are_added_changed_and_removed_in_steps(side: FeatherSide) -> None:
+    listed, history = side.placements, side.desk.session.history
+    listed.add.click()
+    assert [p.kind for p in side.desk.document.feathers[0].placements] == ["rows", "even"]
+    assert history.undo_name == "Set more feathers"
+    assert listed.which.value() == 1
+    listed.kind.enter("repulsion")
+    listed.count.enter(77)
+    made = side.desk.document.feathers[0].placements[1]
+    assert (made.kind, made.count) == ("repulsion", 77)
+    assert listed.which.words() == "2 · 77 repulsion"
+    listed.remove.click()
+    assert len(side.desk.document.feathers[0].placements) == 1
+    assert listed.which.value() == 0
