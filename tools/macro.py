@@ -8,7 +8,7 @@ import runpy
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -18,9 +18,6 @@ from core.formats.atomic import atomic_write
 from core.record import Record
 from core.workspace import Respect
 from tools.hand import StrokeRecord
-
-if TYPE_CHECKING:
-    from tools.session import Session
 
 MOST_NUMBERS = 64  # of an array that is written into a script
 
@@ -110,8 +107,10 @@ class Macro:
             self._place += 1
 
 
-def play(path: str | os.PathLike[str], session: Session) -> None:
-    """Do in a session what a saved macro says. It is a program: only play macros you trust.
+def play(path: str | os.PathLike[str], session: object) -> None:
+    """Do in a session (a ``tools.session.Session``) what a saved macro says.
+
+    It is a program: only play macros you trust.
 
     Raises
     ------
