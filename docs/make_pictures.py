@@ -33,8 +33,9 @@ from tests.display import ensure_display
 
 PICTURES = Path(__file__).parent / "pictures"
 CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's meshes, CC BY 4.0
-SINTEL = Path("matchmove/seq_sintel_raft/demo-frames")  # Blender Foundation, CC BY 3.0
-FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"  # the chapter made of its steps stands between
+# the chapter made of its steps stands between
+FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"
+FIRST_TRACK = "<!-- first track -->\n", "\n<!-- end of first track -->"
 STYLES = ("short", "fur", "long", "mane")
 
 
@@ -66,12 +67,25 @@ def first_pose() -> None:
     from docs.first_pose import SIZE, STEPS, chapter, picture_of
 
     pictures_of_steps(STEPS, SIZE, picture_of)
-    manual = PICTURES.parent / "pose.md"
-    before, _, rest = manual.read_text("utf-8").partition(FIRST_POSE[0])
-    _, end, after = rest.partition(FIRST_POSE[1])
+    _put_chapter("pose.md", FIRST_POSE, chapter())
+
+
+def first_track() -> None:
+    """Follow the first tracks by hand; a picture of the window after every step."""
+    ensure_display()  # before anything of Qt is made
+    from docs.first_track import SIZE, STEPS, chapter, picture_of
+
+    pictures_of_steps(STEPS, SIZE, picture_of)
+    _put_chapter("match.md", FIRST_TRACK, chapter())
+
+
+def _put_chapter(page: str, marks: tuple[str, str], chapter: str) -> None:
+    manual = PICTURES.parent / page
+    before, _, rest = manual.read_text("utf-8").partition(marks[0])
+    _, end, after = rest.partition(marks[1])
     if not end:
-        raise SystemExit(f"pose.md has no line {FIRST_POSE[1]}: put it after the chapter that is to be made")
-    manual.write_text(before + FIRST_POSE[0] + chapter() + FIRST_POSE[1] + after, "utf-8")
+        raise SystemExit(f"{page} has no line {marks[1]}: put it after the chapter that is to be made")
+    manual.write_text(before + marks[0] + chapter + marks[1] + after, "utf-8")
 
 
 def pictures_of_steps(steps: Sequence[Any], size: tuple[int, int], picture_of: Callable[[int], str]) -> None:
@@ -159,7 +173,10 @@ def main() -> None:
     if not data:
         print("FILOPLUME_DATA is not set: the pictures of the cat stay as they are")
         return
+    from docs.first_track import SINTEL
+
     match_window(Path(data) / SINTEL)
+    first_track()
     mesh = read_mesh(Path(data) / CAT, unit="m", up="y").mesh
     made = []
     for name in STYLES:

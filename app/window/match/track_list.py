@@ -173,6 +173,7 @@ class _Tracks(QTreeWidget):
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setUniformRowHeights(True)
         self.setAccessibleName("Tracks")
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # after a click the keys still go to the plate
         self.setHeaderLabels(HEADS)
         for place, words in enumerate(TIPS):
             self.headerItem().setToolTip(place, words)

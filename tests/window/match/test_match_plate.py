@@ -260,6 +260,9 @@ def test_a_click_in_the_list_is_no_step_and_shapes_are_deleted_one_by_one(opened
     QTest.mouseClick(tracks.list.viewport(), LEFT, pos=row)
     assert len(desk.document.track_selection) == 1
     assert desk.session.history.names == steps
+    desk.set_workspace(frame=float(FIRST + 2))
+    hand.key(Qt.Key.Key_Left)
+    hand.until(lambda: desk.workspace.frame == FIRST + 1)  # the keys still go to the plate
     here = desk.document.plates[0].id
     masks = tuple(
         Mask(id=n, name=f"m{n}", frames=freeze(np.array([FIRST], np.int32)), plate_id=here,
