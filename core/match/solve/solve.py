@@ -54,6 +54,7 @@ HYPOTHESES = 6
 RAMPS = (0.35, -0.35)  # of the logarithm of the focal length from the first frame to the last
 RAMPED = 0.9  # of the residuals: such a zoom or bend explains more
 LEFT_OUT, WANDERS = 0.1, 0.1  # share of the tracks that do not fit, and correlation of what the others miss by
+LEAST_DOUBTED = 6  # tracks of a frame in which some do not fit
 ROUNDS_OUT = 5  # of leaving out what does not fit; two, and more while slow slides are found
 ROUNDS, REFOCUSED = 3, 0.002  # of a camera whose distortion was taken out at a focal length that moved by this part
 REBENT = 1e-3  # of a number of a lens that was taken for another
@@ -610,8 +611,10 @@ class _Problem:
             held = held & (seen >= 2)
             used &= held[observations.track]
             state = adjust(state, observations.take(used), free, tolerance=1e-6, least_damping=least).state
-        enough = np.bincount(observations.frame[used], minlength=count) >= 4
-        known = known & enough
+        of_frame = np.bincount(observations.frame[used], minlength=count)
+        seen_there = np.bincount(observations.frame, minlength=count)
+        # four tracks may fit a wrong camera when the fifth, which does not, was left out for it
+        known = known & (of_frame >= np.where(of_frame < seen_there, LEAST_DOUBTED, 4))
         used &= known[observations.frame]
         final = residuals(state, observations.take(used))
         freedom = 2 * int(used.sum()) - len(columns) * int(known.sum()) - 3 * int(held.sum())
