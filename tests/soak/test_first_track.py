@@ -31,6 +31,6 @@ def test_the_first_tracks_followed_literally(tmp_path: Path, monkeypatch: pytest
     tracks = {track.id: track for track in desk.document.tracks}
     assert tracks[7].frames.tolist() == [16, 17, 18]
     assert tracks[11].frames.tolist() == [16, 17, 18, 19, 20]
-    for number in (7, 11):  # neither turns by more than the hand that held the camera, as the one did that the apple took
+    for number in (7, 11):  # neither turns by more than a camera in a hand, as the one did that the apple took
         assert np.abs(np.diff(tracks[number].points, 2, axis=0)).max() < 0.3
     hand.window.close_unasked()
