@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 
 from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
+from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.export import instances, left_crossing, shown_rows
 from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Laid, Plumage
+from core.feather.coat.worn import worn_preset, worn_values
+from core.feather.look import FeatherLook, look_of
 from core.feather.pieces import FeatherMesh
 from core.formats.usd_feathers import FeatherFrame
 from core.mesh.skin import Skin
 
 Figures = dict[str, Any]
 EXPORTED = ("age", "spacing", "tract")  # columns every program gets beside places and ids
-MATERIAL = (0.32, 0.24, 0.14)  # linear RGB
 LISTED = 100  # crossing pairs named in a report
 
 
@@ -49,6 +51,11 @@ def worse(one: Figures, other: Figures) -> Figures:
         key: value if (len(value) if isinstance(value, list) else value) >= size[key] else one[key]
         for key, value in other.items()
     }
+
+
+def coat_look(coat: FeatherCoat) -> FeatherLook:
+    """The material of a coat: that of the feathers on its body."""
+    return look_of(worn_values(coat, worn_preset(coat)))
 
 
 def export_frame(

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import posed_document
-from app.feather_frames import MATERIAL, Figures, export_frame, frame_range, worse
+from app.feather_frames import Figures, coat_look, export_frame, frame_range, worse
 from app.report import Report, peak_megabytes
 from core.document import find_mesh, keys_of
 from core.errors import UserError
@@ -107,7 +107,7 @@ def bake_frame(job: Job) -> Figures:
     written, figures = export_frame(laid, float(frame), each, kept.evaluator, kept.added)
     with atomic_write(path) as temporary:
         writer = FeatherWriter(
-            temporary, kept.coat.name, item.mesh, maker(), MATERIAL, True, kept.document.fps)
+            temporary, kept.coat.name, item.mesh, maker(), coat_look(kept.coat), True, kept.document.fps)
         writer.write(written)
         writer.close(float(frame), float(frame))
     return figures

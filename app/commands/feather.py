@@ -17,9 +17,11 @@ from core.feather.attributes import ATTRIBUTES, COLUMNS, SIDES
 from core.feather.compare import blend, compare
 from core.feather.dials import DIAL_NAMES, turned
 from core.feather.levels import LEVELS, Level, feather_mesh
+from core.feather.look import look_of
 from core.feather.presets import preset_names, preset_values
 from core.formats.atomic import atomic_write
 from core.formats.curve_file import maker
+from core.formats.feather_look import write_mtlx
 from core.formats.usd_feather import NURBS, SUFFIXES, write_feather
 
 LIGHT = ((0.66, 0.66, 0.66), (0.52, 0.52, 0.52))  # display RGB behind a feather, top and bottom
@@ -28,7 +30,7 @@ TOWARDS = (0.35, 0.15, -1.0)  # from the camera: a little from the left and from
 
 def command(
     preset: Annotated[str, typer.Argument(help="A feather, or `list`; see docs/feather.md.", show_default=False)],
-    output: Annotated[list[Path] | None, typer.Option("--output", "-o", help="A .png, .usda, .usdc or .usd. May be given again.", show_default=False)] = None,
+    output: Annotated[list[Path] | None, typer.Option("--output", "-o", help="A .png, .usda, .usdc, .usd, or .mtlx with its material. May be given again.", show_default=False)] = None,
     level: Annotated[str, typer.Option(help=f"One of {', '.join(LEVELS)}; {NURBS} for OpenUSD.")] = "barbs",
     dial: Annotated[list[str] | None, typer.Option(help=f"NAME=-1..1, of {', '.join(DIAL_NAMES)}. May be given again.")] = None,
     attribute: Annotated[list[str] | None, typer.Option("--set", help="ATTRIBUTE=NUMBER, of one side or of both. May be given again.")] = None,
@@ -48,8 +50,8 @@ def command(
         raise typer.BadParameter(f"{level} is not a level; there are {', '.join((*LEVELS, NURBS))}", param_hint="--level")
     outputs = output or []
     for path in outputs:
-        if path.suffix.lower() not in (".png", *SUFFIXES):
-            raise UserError(f"{path.name}: a feather is written as .png, .usda, .usdc or .usd.")
+        if path.suffix.lower() not in (".png", ".mtlx", *SUFFIXES):
+            raise UserError(f"{path.name}: a feather is written as .png, .usda, .usdc or .usd, its material as .mtlx.")
         if path.suffix.lower() == ".png" and level == NURBS:
             raise UserError(f"A picture shows one of the levels {', '.join(LEVELS)}; {NURBS} is for OpenUSD.")
     values = preset_values(preset)
@@ -69,6 +71,9 @@ def command(
             with report.stage("write", f"writing {path.name}"):
                 if path.suffix.lower() == ".png":
                     _picture(path, values, seed, level, size)
+                elif path.suffix.lower() == ".mtlx":
+                    with atomic_write(path) as beside:
+                        write_mtlx(beside, look_of(values))
                 else:
                     with atomic_write(path) as beside:
                         write_feather(beside, values, seed, _level(level), maker())

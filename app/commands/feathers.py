@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import draw, posed_document
-from app.feather_frames import MATERIAL, Figures, export_frame, frame_range, worse
+from app.feather_frames import Figures, coat_look, export_frame, frame_range, worse
 from app.report import Report, peak_megabytes
 from core.document import Document, MeshObject, with_feathers, with_groom
 from core.errors import UserError
@@ -119,7 +119,7 @@ def _written(
                 continue
             temporary = stack.enter_context(atomic_write(path))
             writers.append(FeatherWriter(
-                temporary, dressed.coat.name, item.mesh, maker(), MATERIAL, wanted is not None,
+                temporary, dressed.coat.name, item.mesh, maker(), coat_look(dressed.coat), wanted is not None,
                 document.fps))
         start = float(document.first_frame)
         added = None if wanted is None or each else added_at_rest(rest, evaluator.workers)

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import draw
-from app.feather_frames import MATERIAL, export_frame
+from app.feather_frames import coat_look, export_frame
 from app.report import Report
 from core.document import Document, find_mesh, keys_of
 from core.errors import UserError
@@ -83,7 +83,7 @@ def _export(document: Document, folder: Path, picture: bool, report: Report) -> 
         written, figures = export_frame(laid, float(document.first_frame), False, evaluator)
         if figures["crossings"] or figures["skin_hits"]:
             report.note(f"{coat.name}: {figures['crossings']} feathers still cross, {figures['skin_hits']} reach the skin")
-        writer = FeatherWriter(folder / f"feathers_{coat.id}.usdc", coat.name, mesh, maker(), MATERIAL, False)
+        writer = FeatherWriter(folder / f"feathers_{coat.id}.usdc", coat.name, mesh, maker(), coat_look(coat), False)
         writer.write(written)
         writer.close()
     if picture and document.meshes:

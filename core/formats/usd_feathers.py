@@ -6,7 +6,7 @@ What is written, under the default prim ``/Feathers`` (metres, Y up, extents aut
     /Feathers/<name>/Prototypes    one Mesh for every quantised shape, feathers of length 1
     /Feathers/<name>               or Mesh: all feathers, with the primvar feather_id per face
     /Feathers/mesh                 the animal, moving where it moves
-    /Feathers/Looks/feather        a UsdPreviewSurface bound to both
+    /Feathers/Looks/feather        UsdPreviewSurface and MaterialX, bound to both
 
 ``ids`` are those of the document: the same feather has the same id in every frame and version. ``orientationsf`` holds
 the turns in 32 bits and wins where it is known; ``orientations`` the same in 16 for older readers.
@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.feather.coat.export import Instances
+from core.feather.look import FeatherLook
+from core.formats.feather_look import usd_material
 from core.mesh.mesh import Mesh
 
 SUFFIXES = (".usd", ".usda", ".usdc")
-ROUGHNESS = 0.55
 
 
 class FeatherFrame(NamedTuple):
@@ -48,11 +49,11 @@ class FeatherWriter:
     Parameters
     ----------
     path : .usda, .usdc or .usd. name : of the coat. mesh : the animal at rest. maker : name and version of the program.
-    color : linear RGB of the material. animated : values become time samples of their frames.
+    look : of its feathers from afar. animated : values become time samples of their frames.
     """
 
     def __init__(
-        self, path: Path, name: str, mesh: Mesh, maker: str, color: tuple[float, float, float], animated: bool,
+        self, path: Path, name: str, mesh: Mesh, maker: str, look: FeatherLook, animated: bool,
         fps: float = 24.0,
     ) -> None:
         from pxr import Sdf, Usd, UsdGeom
@@ -70,7 +71,7 @@ class FeatherWriter:
         root.SetCustomDataByKey("filoplume", {"version": maker, "name": name})
         self._place = f"/Feathers/{_identifier(name)}"
         self._known: dict[tuple[int, ...], int] = {}
-        self._material = _material(stage, color)
+        self._material = usd_material(stage, "/Feathers/Looks/feather", look)
         self._mesh = _animal(stage, mesh)
         self._coat: Any = None
         if animated:
@@ -199,18 +200,6 @@ def _animal(stage: Any, mesh: Mesh) -> Any:
         st = api.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
         st.Set(Vt.Vec2fArray.FromNumpy(mesh.uvs))
     return made
-
-
-def _material(stage: Any, color: tuple[float, float, float]) -> Any:
-    from pxr import Gf, Sdf, UsdShade
-
-    material = UsdShade.Material.Define(stage, "/Feathers/Looks/feather")
-    shader = UsdShade.Shader.Define(stage, "/Feathers/Looks/feather/surface")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*color))
-    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(ROUGHNESS)
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    return material
 
 
 def _identifier(name: str) -> str:

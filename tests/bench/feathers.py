@@ -19,6 +19,7 @@ from core.feather.coat.place import place_feathers
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.posing import LENGTH
 from core.feather.coat.proxy import demoted, promoted
+from core.feather.look import FeatherLook
 from core.formats.mesh_file import read_mesh
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.groom.groom import Groom
@@ -104,7 +105,7 @@ def _torso(evaluator: Evaluator) -> list[Row]:
     ]
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        writer = FeatherWriter(Path(folder) / "coat.usdc", "coat", mesh, "bench", (0.3, 0.2, 0.1), False)
+        writer = FeatherWriter(Path(folder) / "coat.usdc", "coat", mesh, "bench", FeatherLook((0.3, 0.2, 0.1)), False)
         writer.write(FeatherFrame(1001.0, rest.skin.points, found, found.ids, None, {}))
         writer.close()
         rows.append(Row("USD written", time.perf_counter() - start, "s"))

@@ -8,6 +8,7 @@ from core.evaluator import Evaluator
 from core.feather.coat.dress import dress_feathers
 from core.feather.coat.export import added_at_rest, instances
 from core.feather.coat.plumage import Plumage
+from core.feather.look import FeatherLook
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.value import constant
 from tests.core.feather.coat.bodies import crossing_by_solving, egg
@@ -24,7 +25,7 @@ def laid():
 
 def opened(path, laid, animated=False, **given):
     rest, _, mesh = laid
-    writer = FeatherWriter(path, "plumage", mesh, "test", (0.3, 0.2, 0.1), animated)
+    writer = FeatherWriter(path, "plumage", mesh, "test", FeatherLook((0.3, 0.2, 0.1)), animated)
     for frame in (1001.0, 1002.0) if animated else (1001.0,):
         writer.write(FeatherFrame(frame, rest.skin.points, **given, attributes={}))
     writer.close(*((1001.0, 1002.0) if animated else ()))
