@@ -10,19 +10,19 @@ import pytest
 
 from docs.first_track import SIZE, STEPS
 from tests.window.alone import hand_at
+from tests.window.conftest import OFFSCREEN, home  # noqa: F401 (fixture)
 
 
+@pytest.mark.skipif(OFFSCREEN is not None, reason=str(OFFSCREEN))
 @pytest.mark.timeout(200)
-def test_the_first_tracks_followed_literally(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_tracks_followed_literally(home: Path, qapp: object) -> None:  # noqa: F811
     if "FILOPLUME_DATA" not in os.environ:
         pytest.skip("FILOPLUME_DATA names no folder of real plates")
-    for name in ("STATE", "SETTINGS"):
-        monkeypatch.setenv(f"FILOPLUME_{name}", str(tmp_path))
     hand = hand_at(None, SIZE)
     desk = hand.window.desk
     made: list[str] = []
     for step in STEPS:
-        step.do(hand, tmp_path)
+        step.do(hand, home)
         made += step.made
         assert list(desk.session.history.names)[1:] == made, step.title
         if step.title.startswith("See"):
