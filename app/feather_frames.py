@@ -9,6 +9,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from app.report import Report
 from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat
@@ -31,15 +32,29 @@ def frame_range(words: str | None) -> tuple[int, int] | None:
     if words is None:
         return None
     sign, rest = ("-", words[1:]) if words.startswith("-") else ("", words)
-    first, _, last = rest.partition("-")
+    first, dash, last = rest.partition("-")
     try:
         begin = int(sign + first)
-        end = int(last) if last else begin
+        end = int(last) if dash else begin
     except ValueError:
         raise typer.BadParameter(f"frames are two numbers such as 1001-1024, not {words!r}") from None
     if end < begin:
         raise typer.BadParameter(f"the last frame {end} comes before the first, {begin}")
     return begin, end
+
+
+def say_beyond_clips(document: Document, wanted: tuple[int, int], report: Report) -> None:
+    """Say it where some of the frames that are asked for lie outside everything that plays in a document."""
+    clips = [item.rig.clip for item in document.meshes if item.rig is not None and item.rig.clip is not None]
+    if not clips:
+        report.note("no clip moves the mesh; it is the same in every frame")
+        return
+    start, end = min(clip.start for clip in clips), max(clip.end for clip in clips)
+    begin, last = wanted
+    if last < start or begin > end:
+        report.note(f"the clip plays frames {start:g}-{end:g}; the mesh stands still in all of {begin}-{last}")
+    elif begin < start or last > end:
+        report.note(f"the clip plays frames {start:g}-{end:g}; before and after it the mesh stands still")
 
 
 def worse(one: Figures, other: Figures) -> Figures:

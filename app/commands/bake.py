@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import posed_document
-from app.feather_frames import Figures, coat_look, export_frame, frame_range, worse
+from app.feather_frames import Figures, coat_look, export_frame, frame_range, say_beyond_clips, worse
 from app.report import Report, peak_megabytes
 from core.document import find_mesh, keys_of
 from core.errors import UserError
@@ -47,6 +47,7 @@ def command(
     folder = file.resolve().parent if output is None else output
     if not folder.is_dir():
         raise UserError(f"the folder {folder} does not exist; make it first")
+    say_beyond_clips(document, wanted, report)
     numbers = range(wanted[0], wanted[1] + 1)
     jobs = [(str(file), coat.id, frame, str(_place(folder, file, coat.name, frame)), each)
             for coat in shown for frame in numbers]

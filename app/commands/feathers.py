@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from app.deliver import draw, posed_document
-from app.feather_frames import Figures, coat_look, export_frame, frame_range, worse
+from app.feather_frames import Figures, coat_look, export_frame, frame_range, say_beyond_clips, worse
 from app.report import Report, peak_megabytes
 from core.document import Document, MeshObject, with_feathers, with_groom
 from core.errors import UserError
@@ -56,6 +56,8 @@ def command(
     with report.working(total=5 + len(output)):
         with report.stage("load", f"reading {mesh.name}"):
             document = _document(mesh, unit, up, wanted is not None, report)
+            if wanted is not None:
+                say_beyond_clips(document, wanted, report)
         item = document.meshes[0]
         with report.stage("keys", "laying keys along the body"):
             dressed = dress_feathers(
@@ -91,10 +93,8 @@ def _check(outputs: list[Path]) -> None:
 def _document(path: Path, unit: str | None, up: str | None, moving: bool, report: Report) -> Document:
     """The mesh of a file, with what moves it when frames are asked for."""
     if moving and path.suffix.lower() in rig_file.READ_SUFFIXES:
-        try:
+        with suppress(NoRig):
             return rig_file.document_of(rig_file.read_rig(path, unit=unit, up=up, say=report.note))
-        except NoRig:
-            report.note(f"nothing in {path.name} moves; every frame will be the same")
     source = read_mesh(path, unit=unit, up=up, say=report.note)
     return Document(meshes=(MeshObject(id=1, name=source.name, mesh=source.mesh),))
 

@@ -10,9 +10,19 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from app import cli
+from app.feather_frames import say_beyond_clips
+from app.report import Report
+from core.document import Document, MeshObject, with_feathers, with_groom
+from core.evaluator import Evaluator
+from core.feather.coat.dress import dress_feathers
 from core.formats.mesh_file import write_mesh
-from core.formats.project import read_project
+from core.formats.project import read_project, write_project
+from core.groom.dress import dress
+from core.groom.groom import Map
+from core.groom.style import load_style
+from core.record import freeze
 from tests.core.feather.coat.bodies import egg
+from tests.tools import scenes
 
 
 @pytest.fixture
@@ -65,11 +75,46 @@ def test_a_project_of_feathers_is_baked_and_published(bird, tmp_path, capsys):
     assert os.readlink(tmp_path / "shot" / "latest") == "v001"
 
 
+def test_an_owl_with_feathers_and_bristles_round_its_beak_is_one_file(tmp_path, capsys):
+    mesh, beak, project = egg(), np.array([0.0, 0.0, 0.6]), tmp_path / "owl.filo"
+    near = Map(name="beak", values=freeze((np.linalg.norm(mesh.points - beak, axis=1) < 0.2).astype(np.float32)))
+    evaluator = Evaluator()
+    coat, keys = dress_feathers(mesh, evaluator, 80, preset="owl", keys=6)
+    bristles = dress(
+        mesh, load_style("short"), evaluator, 12, 40, maps=(near,), density_map="beak", name="bristles").replace(id=2)
+    evaluator.close()
+    owl = Document(meshes=(MeshObject(id=1, name="owl", mesh=mesh),))
+    write_project(project, with_groom(with_feathers(with_groom(owl, keys), coat), bristles))
+    made = Path(told(capsys, "publish", project, "--to", tmp_path / "owl", "--no-picture")["path"])
+    assert {path.name for path in made.iterdir()} == {"owl.filo", "feathers_1.usdc", "groom_2.usdc", "version.json"}
+    feathers, hair = (Usd.Stage.Open(str(made / name)) for name in ("feathers_1.usdc", "groom_2.usdc"))
+    assert len(UsdGeom.PointInstancer(feathers.GetPrimAtPath("/Feathers/feathers")).GetIdsAttr().Get()) == 80
+    hairs = [UsdGeom.BasisCurves(prim) for prim in hair.Traverse() if prim.IsA(UsdGeom.BasisCurves)]
+    most = max(hairs, key=lambda curves: len(curves.GetCurveVertexCountsAttr().Get()))
+    counts = np.array(most.GetCurveVertexCountsAttr().Get())
+    assert len(counts) == 40
+    roots = np.array(most.GetPointsAttr().Get())[np.cumsum(counts) - counts]
+    assert np.linalg.norm(roots - beak, axis=1).max() < 0.35  # the map fades over the next vertices
+
+
+@pytest.mark.parametrize(("clip", "frames", "words"), [
+    (False, (1001, 1002), "no clip"), (True, (1, 36), "all of 1-36"), (True, (1021, 1040), "all of 1021-1040"),
+    (True, (1010, 1021), "before and after"), (True, (1000, 1005), "before and after"), (True, (1001, 1020), None),
+])
+def test_frames_outside_the_clip_are_said(clip, frames, words, capsys):
+    document = scenes.document(**({} if clip else {"rig": None}))
+    say_beyond_clips(document, frames, Report(True))
+    said = capsys.readouterr().err
+    assert said.count("note:") == (words is not None)
+    assert words is None or words in said
+
+
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (["feathers", "{bird}", "-o", "{tmp}/coat.fbx"], 1, "usdc"),
     (["feathers", "{tmp}/none.obj", "-o", "{tmp}/coat.usdc"], 1, "none.obj"),
     (["feathers", "{bird}", "-o", "{tmp}/coat.usdc", "--placement", "heap"], 2, "heap"),
     (["feathers", "{bird}", "-o", "{tmp}/coat.usdc", "--frames", "9-1"], 2, "before"),
+    (["feathers", "{bird}", "-o", "{tmp}/coat.usdc", "--frames", "1001-"], 2, "two numbers"),
     (["bake", "{bird}", "--frames", "1-2"], 1, "no project"),
     (["publish", "{bird}", "--to", "{tmp}/shot"], 1, "no project"),
 ])

@@ -46,7 +46,8 @@ def dress_feathers(
     """
     load_bird(preset)  # one that does not exist is said before any work
     skin = skin_at_rest(mesh, evaluator)
-    if not skin.diagonal > 0.0 or not len(skin.triangles.vertices):
+    area = float(face_areas(skin.points, skin.triangles.vertices).sum())
+    if not area > 0.0:
         raise UserError("the mesh has no surface to grow feathers on")
     flow = skin_flow(skin)
     where = scatter(skin.points, skin.triangles.vertices, keys, seed=seed + 1, workers=evaluator.workers)
@@ -56,7 +57,6 @@ def dress_feathers(
     normals = roots.frames[:, 2].astype(np.float64)
     along -= normals * np.einsum("nc,nc->n", along, normals)[:, None]
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    area = float(face_areas(skin.points, skin.triangles.vertices).sum())
     length = overlap * np.sqrt(area / max(count, 1))
     heading = np.cos(LIFT) * along + np.sin(LIFT) * normals
     steps = np.linspace(0.0, min(length, 0.3 * skin.diagonal), POINTS)

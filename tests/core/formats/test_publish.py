@@ -1,9 +1,10 @@
 """Publishing: whole versions under numbers of their own, or nothing."""
 
 import json
+import multiprocessing
 import os
 import stat
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, wait
 
 import pytest
 
@@ -28,16 +29,25 @@ def test_versions_are_numbered_sealed_and_described(tmp_path):
     assert (first / "coat.txt").read_text() == "one"
 
 
-def test_many_at_once_all_succeed(tmp_path):
-    with ThreadPoolExecutor(8) as pool:
-        made = list(pool.map(lambda k: publish(tmp_path, one_file(str(k)), {"k": k}), range(12)))
-    assert versions(tmp_path) == list(range(1, 13))
-    assert sorted(path.name for path in made) == [f"v{n:03d}" for n in range(1, 13)]
-    for k, path in enumerate(made):
-        assert (path / "coat.txt").read_text() == str(k)
-        assert json.loads((path / MANIFEST).read_text())["version"] == int(path.name[1:])
-    assert os.readlink(tmp_path / LATEST) == "v012"
-    assert {path.name for path in tmp_path.iterdir()} == {LATEST, *(f"v{n:03d}" for n in range(1, 13))}
+def publish_number(folder, number):
+    return publish(folder, one_file(str(number)), {"k": number}).name
+
+
+def test_many_processes_at_once_all_succeed_and_latest_always_names_a_whole_version(tmp_path):
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        made = [pool.submit(publish_number, tmp_path, k) for k in range(40)]
+        while wait(made, timeout=0.001).not_done:
+            if (tmp_path / LATEST).is_symlink():
+                seen = json.loads((tmp_path / LATEST / MANIFEST).read_text())
+                assert list(seen["files"]) == ["coat.txt"]
+        names = [one.result() for one in made]
+    assert versions(tmp_path) == list(range(1, 41))
+    assert sorted(names) == [f"v{n:03d}" for n in range(1, 41)]
+    for k, name in enumerate(names):
+        assert (tmp_path / name / "coat.txt").read_text() == str(k)
+        assert json.loads((tmp_path / name / MANIFEST).read_text())["version"] == int(name[1:])
+    assert os.readlink(tmp_path / LATEST) == "v040"
+    assert {path.name for path in tmp_path.iterdir()} == {LATEST, *names}
 
 
 def test_what_fails_leaves_nothing_behind(tmp_path):
