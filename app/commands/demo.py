@@ -1,7 +1,8 @@
-"""``filoplume demo``: what ``make run`` does until the window exists."""
+"""``filoplume demo``: files to look at, and the window on them where somebody sits before one."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,9 @@ import numpy as np
 import typer
 
 from app.commands import groom as groom_command
+from app.commands import window as window_command
 from app.deliver import deliver, draw, posed_document
+from app.display import has_display
 from app.report import Report
 from core.camera import frame_points
 from core.demo import demo_document
@@ -29,19 +32,25 @@ def command(
     mesh: Annotated[Path | None, typer.Option(help="Another animal than the demo's.")] = None,
     folder: Annotated[Path, typer.Option(help="Where the files go.")] = Path("out"),
     hairs: Annotated[int, typer.Option(min=0, max=20_000_000, help="Hairs to grow.")] = 120_000,
+    opened: Annotated[bool | None, typer.Option("--open/--no-open", help="Open the window on it afterwards; without either word, where a terminal and a display are there.", show_default=False)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Write the demo: a groomed animal (demo.filo, .usdc, .png); with pose an arm and a face (pose.filo, .png); with
-    match a dark plate, tracked and solved: camera, head and neck (match.filo, .usda, .jpg)."""
+    """Write the demo and open it: a groomed animal (demo.filo, .usdc, .png); with pose an arm and a face (pose.filo,
+    .png); with match a dark plate, tracked and solved: camera, head and neck (match.filo, .usda, .jpg)."""
     if what not in (None, "pose", "match"):
         raise typer.BadParameter(f"there is no demo {what}; say pose, match, or nothing for the animal")
     folder.mkdir(parents=True, exist_ok=True)
     if what == "match":
         _match(folder, as_json)
-        return
-    if what == "pose":
+    elif what == "pose":
         _pose(folder, as_json)
-        return
+    else:
+        _animal(folder, mesh, hairs, as_json)
+    if opened or (opened is None and not as_json and sys.stdout.isatty() and has_display()):
+        window_command.command(folder / f"{what or 'demo'}.filo")
+
+
+def _animal(folder: Path, mesh: Path | None, hairs: int, as_json: bool) -> None:
     files = [folder / "demo.filo", folder / "demo.usdc"]
     if mesh is not None:
         groom_command.command(mesh, files, hairs=hairs, png=folder / "demo.png", as_json=as_json)

@@ -18,6 +18,7 @@ from PySide6.QtCore import QMessageLogContext, QProcess, Qt, QTimer, QtMsgType, 
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
+from app.display import has_display
 from app.window.garbage import Garbage
 from app.window.memory import keep_freed_memory
 from app.window.settings import LoadedSettings, load_settings
@@ -67,9 +68,7 @@ def run(wish: Wish) -> int:
     for path, what in ((wish.file, "file"), (wish.after, "script")):
         if path is not None and not (path.is_file() or is_plate(path)):
             raise UserError(f"there is no {what} {path}")
-    if sys.platform.startswith("linux") and not any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
-    ):
+    if not has_display():
         raise UserError(NO_DISPLAY)
     keep_freed_memory()
     qInstallMessageHandler(_qt_says)

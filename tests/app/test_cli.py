@@ -260,3 +260,17 @@ def test_ctrl_c_leaves_no_half_written_file(tmp_path):
         for path in folder.iterdir():
             assert filoplume("check", path).returncode == 0
             path.unlink()
+
+
+def test_a_demo_is_written_and_its_window_asked_for(tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    ball = write_ball(tmp_path / "ball.obj")
+    wanted = ("demo", "--mesh", ball, "--hairs", 40, "--folder", tmp_path / "out")
+    done = filoplume(*wanted, "--json")
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"demo.filo", "demo.usdc", "demo.png"}
+    shown = filoplume(*wanted, "--open")
+    assert shown.returncode == 1
+    assert "needs a display" in shown.stderr
+    assert filoplume("demo", "cat").returncode == 2
