@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from PIL import Image
+from PIL.TiffImagePlugin import IFDRational
 
 from core.errors import UserError
 from core.formats.frame_decoder import FrameDecoder
@@ -153,3 +155,17 @@ def test_mixes_see_what_they_say():
     np.testing.assert_allclose((dark - darker)[bright], 0.1, atol=0.002)  # one stop
     flat = mixed((PIXELS // 8 + 20).astype(np.uint8), ChannelMix(contrast=15))
     assert flat.std() > 4 * mixed((PIXELS // 8 + 20).astype(np.uint8), ChannelMix()).std()
+
+
+@pytest.mark.parametrize(("told", "film"), [((4.2, 26), (5.591, 4.194)), ((4.2, None), None), ((0.0, 26), None)])
+def test_focal_length_and_film_back_come_from_exif(tmp_path, decoder, told, film):
+    exif = Image.Exif()
+    facts = exif.get_ifd(0x8769)
+    facts[0x920A] = IFDRational(round(10 * told[0]), 10)
+    if told[1] is not None:
+        facts[0xA405] = told[1]
+    Image.fromarray(np.zeros((30, 40, 3), np.uint8)).save(tmp_path / "phone.0001.jpg", exif=exif)
+    plate = read_plate(tmp_path, decoder)
+    assert plate.focal_mm == (pytest.approx(told[0]) if told[0] else None)
+    # 4.2 mm that is like 26 mm on 36 x 24: a diagonal of 43.267 * 4.2 / 26 mm, four to three
+    assert plate.film_back == (None if film is None else pytest.approx(film, abs=2e-3))
