@@ -19,9 +19,11 @@ from core.feather.dials import DIAL_NAMES, turned
 from core.feather.levels import LEVELS, Level, feather_mesh
 from core.feather.look import look_of
 from core.feather.presets import preset_names, preset_values
+from core.feather.trace import traced
 from core.formats.atomic import atomic_write
 from core.formats.curve_file import maker
 from core.formats.feather_look import write_mtlx
+from core.formats.picture import read_colors
 from core.formats.usd_feather import NURBS, SUFFIXES, write_feather
 
 LIGHT = ((0.66, 0.66, 0.66), (0.52, 0.52, 0.52))  # display RGB behind a feather, top and bottom
@@ -36,6 +38,7 @@ def command(
     attribute: Annotated[list[str] | None, typer.Option("--set", help="ATTRIBUTE=NUMBER, of one side or of both. May be given again.")] = None,
     to: Annotated[str | None, typer.Option(help="Another feather to blend with and to compare with.")] = None,
     share: Annotated[float, typer.Option(min=0.0, max=1.0, help="How much of the other one.")] = 0.5,
+    trace: Annotated[Path | None, typer.Option(help="A photograph of one feather on a plain ground: take its outline and colours.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Another number gives another feather of the same kind.")] = 0,
     size: Annotated[str, typer.Option(help="Width x height of a picture in pixels.")] = "600x1000",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -61,6 +64,8 @@ def command(
         told["differs"] = len(found.attributes)
         told["outline"] = found.outline_most
         values = blend(values, preset_values(to), share)
+    if trace is not None:
+        values = traced(read_colors(trace), values)
     try:
         values = turned(values, **dict(map(_numbered, dial or [])))
     except ValueError as error:

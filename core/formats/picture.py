@@ -85,3 +85,19 @@ def decode_in_child(path: str) -> dict[str, Any]:
     if pixels.ndim == 3:
         pixels = pixels[:, :, [2, 1, 0, 3][: pixels.shape[2]]]
     return {"pixels": np.ascontiguousarray(pixels)}
+
+
+def read_colors(path: str | Path) -> NDArray[np.uint8]:
+    """A picture as (H, W, 3) uint8 sRGB, top row first; grey becomes colour, what is see-through lies on white.
+
+    Raises
+    ------
+    UserError
+        As :func:`read_picture`.
+    """
+    found = np.clip(read_picture(path), 0.0, 1.0)
+    if found.ndim == 2:
+        found = np.repeat(found[..., None], 3, axis=2)
+    if found.shape[2] == 4:
+        found = found[..., :3] * found[..., 3:] + (1.0 - found[..., 3:])
+    return np.asarray(np.round(255.0 * found), np.uint8)

@@ -6,12 +6,13 @@ What is edited is the coat of the keys at hand: every change is a step of the do
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from app.window.desk import Desk
 from app.window.feather.attribute_list import AttributeList
@@ -20,6 +21,7 @@ from app.window.feather.placements import PlacementList
 from app.window.feather.solid import Draw, SolidView
 from app.window.fields.choice_bar import ChoiceBar
 from app.window.fields.number_bar import NumberBar
+from app.window.files.opening import PICTURE_SUFFIXES, choose_file, filter_of
 from app.window.jobs import Asked, Progress
 from app.window.params_panel import Setting
 from app.window.sections import Column, FoldMemory, Row, Section
@@ -80,6 +82,8 @@ class FeatherSide(QWidget):
         self.told = QLabel()
         self.told.setWordWrap(True)
         self.told.setEnabled(False)
+        self.trace = QPushButton("Trace a photograph…")
+        self.trace.setToolTip("Takes outline and colours of one feather photographed flat on a plain ground.")
         self.dials = {
             dial.name: NumberBar(Field(
                 dial.name.capitalize(), f"{dial.description}. Turns many attributes at once; 0 changes nothing.",
@@ -96,6 +100,8 @@ class FeatherSide(QWidget):
         for name, bar in self.dials.items():
             bar.edited.connect(lambda position, final, name=name: self._dial_edited(name, position, final))
         self.blend.edited.connect(self._blended)
+        self.trace.clicked.connect(lambda: choose_file(
+            self, "Trace a photograph", [filter_of("Photographs", PICTURE_SUFFIXES)], self.trace_photograph))
         for choice in (self.part, self.level, self.drawn, self.other):
             choice.edited.connect(lambda value, final: self.refresh())
         desk.changed.connect(self._document_changed)
@@ -119,7 +125,8 @@ class FeatherSide(QWidget):
         below = Column()
         below.add(Section("Dials", _rows(self.dials.values()), memory, "feather dials"))
         other = _rows((self.other, self.blend))
-        other.layout().addWidget(self.told)  # type: ignore[union-attr]
+        for widget in (self.told, self.trace):
+            other.layout().addWidget(widget)  # type: ignore[union-attr]
         below.add(Section("Another feather", other, memory, "feather other"))
         below.add(Section("Placement", self.placements, memory, "feather placement"))
         below.add(Section("Attributes", self.attributes, memory, "feather attributes"))
@@ -157,7 +164,7 @@ class FeatherSide(QWidget):
         if self.desk.session.stroking or not self.isVisible():
             return
         coat = self.coat
-        choices = (self.part, self.level, self.drawn, self.other, self.blend)
+        choices = (self.part, self.level, self.drawn, self.other, self.blend, self.trace)
         for widget in (*self.dials.values(), self.attributes, *choices):
             widget.setEnabled(coat is not None and not coat.locked)
         if coat is None:
@@ -275,6 +282,26 @@ class FeatherSide(QWidget):
     def _committed(self, coat_id: int) -> FeatherCoat:
         """The coat as it was before the hand came."""
         return find_feathers(self.desk.session.history.current, coat_id)
+
+    def trace_photograph(self, path: Path) -> None:
+        """Give the feathers the outline and the colours of the feather in a photograph."""
+        coat = self.coat
+        if coat is None:
+            return
+        values, coat_id, part = self.values(coat), coat.id, self.part.value()
+
+        def work(progress: Progress, cancelled: Asked) -> NDArray[np.float32]:
+            from core.feather.trace import traced
+            from core.formats.picture import read_colors
+
+            return traced(read_colors(path), values)
+
+        def put(found: NDArray[np.float32]) -> None:
+            from tools.feather_edits import wear_feather
+
+            self.desk.edit("Trace feather", wear_feather, coat_id, found, part)
+
+        self.desk.jobs.start(f"Tracing {path.name}", work, put, owner=self)
 
     def _change(
         self, step: str, final: bool, same: bool, coat_id: int, edit: Callable[..., Document], *args: object

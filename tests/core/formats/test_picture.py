@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from core.errors import UserError
-from core.formats.picture import read_picture
+from core.formats.picture import read_colors, read_picture
 
 
 def png(width, height, depth, colour, body):
@@ -69,3 +69,11 @@ def test_what_is_no_sound_picture_is_refused(content, words, tmp_path):
 def test_a_missing_picture_is_named(tmp_path):
     with pytest.raises(UserError, match=r"gone\.png"):
         read_picture(tmp_path / "gone.png")
+
+
+def test_pictures_become_colours_of_the_screen_on_white(tmp_path):
+    pixel = np.array([[[10, 20, 200, 0], [10, 20, 200, 255]]], np.uint8)  # blue, green, red, alpha
+    cv2.imwrite(str(tmp_path / "some.png"), pixel)
+    np.testing.assert_array_equal(read_colors(tmp_path / "some.png"), [[[255, 255, 255], [200, 20, 10]]])
+    cv2.imwrite(str(tmp_path / "grey.png"), np.array([[7, 9]], np.uint8))
+    np.testing.assert_array_equal(read_colors(tmp_path / "grey.png"), [[[7] * 3, [9] * 3]])

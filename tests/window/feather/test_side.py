@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
@@ -146,3 +148,15 @@ def test_placements_are_added_changed_and_removed_in_steps(side: FeatherSide) ->
     listed.remove.click()
     assert len(side.desk.document.feathers[0].placements) == 1
     assert listed.which.value() == 0
+
+
+def test_a_photograph_is_traced(side: FeatherSide, qtbot: QtBot, tmp_path: Path) -> None:
+    picture = np.full((300, 200, 3), 255, np.uint8)
+    cv2.ellipse(picture, (100, 120), (40, 100), 0, 0, 360, (40, 40, 160), -1)  # blue, green, red
+    cv2.line(picture, (100, 200), (100, 290), (40, 40, 160), 4)
+    cv2.imwrite(str(tmp_path / "photo.png"), picture)
+    side.trace_photograph(tmp_path / "photo.png")
+    qtbot.waitUntil(lambda: side.desk.session.history.undo_name == "Trace feather", timeout=60_000)
+    made = worn(side)
+    assert made[COLUMNS["vaneStartLeft"]] == pytest.approx(70 / 270, abs=0.05)  # the quill is a quarter of it
+    assert made[COLUMNS["colorMiddleRed"]] == pytest.approx(((160 / 255 + 0.055) / 1.055) ** 2.4, abs=0.01)
