@@ -29,9 +29,11 @@ from core.match.fit_rig import Fit, fit
 from core.match.rig_places import posed, rig_parameter, rig_places
 from core.match.solve.coordinates import onto
 from core.match.solve.held import Known, hold
+from core.match.solve.observed import observations_of
 from core.match.solve.report import report
 from core.match.solve.shot import FLIP, Shot, shot_of
-from core.match.solve.solve import Options, Solution, observations_of, solve
+from core.match.solve.solution import Options, Solution
+from core.match.solve.solve import solve
 from core.match.solve.things import Found, Given, find_thing
 from core.match.solved import SolveSettings
 from core.match.track import Track, TrackSettings, keyed_track

@@ -13,7 +13,7 @@ from app.page import STYLE, Read, bytes_of, picture_data
 from core.match.lens import coefficients, model_of
 from core.match.solve.parallax import parallax_degrees
 from core.match.solve.report import Report
-from core.match.solve.solve import Solution
+from core.match.solve.solution import Solution
 from core.match.solve.state import Array, projected
 
 MOST_TRACKS = 300

@@ -16,7 +16,8 @@ from core.match.lens import coefficients, model_of
 from core.match.solve import report as judging
 from core.match.solve.held import Known, hold
 from core.match.solve.shot import FLIP, shot_of
-from core.match.solve.solve import Options, Solution, solve
+from core.match.solve.solution import Options, Solution
+from core.match.solve.solve import solve
 from core.match.solve.things import Found, Given, find_thing, without
 from core.match.solve.together import Pictures, together
 from core.match.track import Track

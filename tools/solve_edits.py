@@ -36,9 +36,11 @@ def solved_camera(
     UserError
         There is no camera to be trusted; the message says why.
     """
+    from core.match.solve.observed import observations_of
     from core.match.solve.report import helpful, report  # large; the start of the window does without
     from core.match.solve.shot import shot_of
-    from core.match.solve.solve import Options, observations_of, solve
+    from core.match.solve.solution import Options
+    from core.match.solve.solve import solve
 
     names = [track.name for track in tracks]
     observations, frames = observations_of(tracks)

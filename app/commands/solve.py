@@ -18,7 +18,7 @@ from core.formats.lens_file import read_lens
 from core.formats.picks_json import photographs_of
 from core.formats.track_file import read_tracks
 from core.match.lens import MODELS, model_of
-from core.match.solve.solve import Options
+from core.match.solve.solution import Options
 
 LENSES = ("none", *(model.name for model in MODELS))
 

@@ -19,7 +19,8 @@ from core.match.matches import matched_photographs
 from core.match.photomodel.records import moved_pick
 from core.match.photomodel.solve import solved
 from core.match.solve.coordinates import onto
-from core.match.solve.solve import Options, Solution, solve
+from core.match.solve.solution import Options, Solution
+from core.match.solve.solve import solve
 from core.match.solve.state import Observations, State
 from core.match.solve.views import Camera, Views
 from tests.bench.bench import Row, median_ms

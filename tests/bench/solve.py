@@ -18,7 +18,8 @@ import numpy as np
 
 from core.match.solve.bundle import POSE, Free, adjust, smooth_zoom
 from core.match.solve.report import report
-from core.match.solve.solve import Options, Solution, solve
+from core.match.solve.solution import Options, Solution
+from core.match.solve.solve import solve
 from core.match.solve.state import FRAME_FOCAL
 from tests.bench.bench import Row
 from tests.bench.blender_reads import peers_python

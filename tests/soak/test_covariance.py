@@ -5,7 +5,8 @@ import numpy as np
 from core.match.solve.bundle import RIGID, adjust
 from core.match.solve.coordinates import onto
 from core.match.solve.report import report
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import projected
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, shot
 

@@ -16,7 +16,8 @@ from core.match.photomodel.rows import Table, constraints_of, table_of
 from core.match.solve.bundle import POSE, Free, adjust
 from core.match.solve.constraints import HARD, Constraint, Pull, circle_of
 from core.match.solve.coordinates import Frame, Similarity, onto, to_frame
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import FOCAL, FRAME_FOCAL, Array, Flags, State, residuals, start_lens
 from core.match.solve.views import as_one, guessed, ties
 

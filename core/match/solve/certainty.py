@@ -12,7 +12,7 @@ import numpy as np
 
 from core.match.solve.bundle import Free, Reduced, normal_equations, reduced
 from core.match.solve.slides import correlation
-from core.match.solve.solve import Solution
+from core.match.solve.solution import Solution
 from core.match.solve.state import (
     ASPECT,
     CENTRE_X,

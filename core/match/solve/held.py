@@ -12,7 +12,7 @@ from core.match.solve.bundle import adjust
 from core.match.solve.constraints import Constraint, Pull, check
 from core.match.solve.coordinates import Frame, onto, rows_of, to_frame
 from core.match.solve.shot import FLIP
-from core.match.solve.solve import Solution
+from core.match.solve.solution import Solution
 from core.match.solve.state import Array, State, residuals
 
 BENT = 1.15  # of the residuals: what is known and what was tracked do not agree

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.match.solve.solve import Solution
+from core.match.solve.solution import Solution
 from core.match.solve.state import Array
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from core.errors import UserError
 from core.match.solve.certainty import Certainty, Fix, Test
 from core.match.solve.nodal import BY_CHANCE, parallax
-from core.match.solve.solve import Solution
+from core.match.solve.solution import Solution
 from core.match.solve.state import FOCAL, FRAME_FOCAL, K1, LENS_NAMES, Array, Rows, residuals
 
 GAIN = 14.0  # of the squares over the variance: a fixed parameter is wrong; one in a thousand solves by chance

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.match.lens import bent, start_lens
-from core.match.solve.solve import Solution
+from core.match.solve.solution import Solution
 from core.match.solve.state import ASPECT, CENTRE_X, CENTRE_Y, FOCAL, Array, Rows
 from core.match.solve.views import TIED
 from core.mesh.mesh import Mesh

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.match.solve.moving import Moving, in_world, solve_moving, solve_with_camera
+from core.match.solve.observed import observations_of
 from core.match.solve.shot import FLIP, Thing
-from core.match.solve.solve import Solution, observations_of
+from core.match.solve.solution import Solution
 from core.match.solve.state import CENTRE_X, CENTRE_Y, FOCAL, Array, Observations, residuals
 from core.match.track import Track
 from core.mesh.mesh import Mesh

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.match.solve.floor import noise_floor
-from core.match.solve.solve import FLOOR, observations_of
+from core.match.solve.observed import observations_of
+from core.match.solve.problem import FLOOR
 from core.match.solve.state import Observations, Rows
 from core.match.solve.views import Camera, Views, one_shot
 from core.match.track import Track

@@ -7,7 +7,8 @@ from core.formats.project import read_project, write_project
 from core.image.plate import Plate
 from core.match.solve.bundle import adjust
 from core.match.solve.report import report
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import residuals
 from core.match.solved import Advice, SolvedCamera, SolveSettings, frozen
 from tests.core.match.solve.shots import FOCAL, SIZE, shot

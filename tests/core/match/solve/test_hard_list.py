@@ -12,7 +12,8 @@ from core.match.solve.floor import noise_floor
 from core.match.solve.nodal import BY_CHANCE, parallax
 from core.match.solve.report import report
 from core.match.solve.slides import correlation, drift_gains
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import Observations, State, projected, start_lens
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, Shot, path_error, shot, turn_error
 

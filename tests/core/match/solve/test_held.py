@@ -8,7 +8,8 @@ from core.formats.known_file import read_known
 from core.match.solve.certainty import Certainty
 from core.match.solve.held import Known, hold
 from core.match.solve.shot import FLIP
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from tests.core.match.solve.shots import FOCAL, SIZE, shot
 
 NAMES = [f"t{k}" for k in range(40)]

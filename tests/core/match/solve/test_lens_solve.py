@@ -4,7 +4,8 @@ import pytest
 from core.match.lens import bent, start_lens
 from core.match.solve.bundle import Free, normal_equations
 from core.match.solve.report import report
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import projected, residuals
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, path_error, shot
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import Observations, State, start_lens
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, path_error, turn_error
 

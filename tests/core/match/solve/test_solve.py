@@ -8,9 +8,11 @@ from app.cli import build
 from core.errors import UserError
 from core.formats import usd_solve
 from core.match.solve.bundle import POSE, TURN, Free, adjust, smooth_zoom
+from core.match.solve.observed import observations_of
 from core.match.solve.report import report
 from core.match.solve.shot import shot_of
-from core.match.solve.solve import Options, observations_of, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import FRAME_FOCAL, Observations, projected
 from core.match.track import keyed_track
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, Shot, path_error, shot, turn_error

@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
 from core.match.solve.report import report
-from core.match.solve.solve import Options, solve
+from core.match.solve.solution import Options
+from core.match.solve.solve import solve
 from core.match.solve.state import Observations, State, projected, start_lens
 from core.match.solve.views import Camera, Views, as_one
 from tests.core.match.solve.shots import FOCAL, SIZE, path_error, shot, turn_error
