@@ -61,6 +61,7 @@ def test_guides_whose_skin_is_gone_are_said_and_selected(opened: Opened, tmp_pat
     words = hand.window.status.words.text()
     assert f"{len(before.grooms[0].guides)} guides is gone" in words
     assert "selected" in words
+    assert "--" not in words, "a window has no options"
 
 
 def test_a_mesh_knows_its_file_and_asks_only_when_that_is_gone(opened: Opened, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QPoint, QProcess, Qt
 from PySide6.QtWidgets import QMenu
 
-from app.window.files.opening import MESH_SUFFIXES, PICTURE_SUFFIXES, choose_file, filter_of
+from app.window.files.opening import MESH_SUFFIXES, PICTURE_SUFFIXES, choose_file, filter_of, without_options
 from app.window.files.recent import RecentMenu
 from app.window.pose.sculpt_door import import_sculpt
 from app.window.screenshot import view_image
@@ -124,7 +124,7 @@ class FileActions:
                 return set_mesh_source(made.with_selection(), item.id, str(path.absolute()), *space_given(found))
 
             if self._desk.edit("Reload mesh", put):
-                self._desk.said.emit(" ".join((reloaded(path.name, replaced), *found.notes)))
+                self._desk.said.emit(" ".join((reloaded(path.name, replaced), *map(without_options, found.notes))))
 
         self._desk.jobs.start(f"Read {path.name}", work, done)
 
