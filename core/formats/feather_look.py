@@ -51,7 +51,7 @@ def usd_material(stage: Any, path: str, look: FeatherLook) -> Any:
         surface = UsdShade.Shader.Define(stage, f"{path}/{name}")
         surface.CreateIdAttr(shader)
         for given, kind, value in inputs:
-            surface.CreateInput(given, kinds[kind]).Set(Gf.Vec3f(*value) if kind == "color3" else value)
+            surface.CreateInput(given, kinds[kind]).Set(Gf.Vec3f(*value) if isinstance(value, tuple) else value)
         made = surface.CreateOutput("surface" if not target else "out", types.Token)
         output = material.CreateSurfaceOutput(target) if target else material.CreateSurfaceOutput()
         output.ConnectToSource(made)
