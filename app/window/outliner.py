@@ -66,7 +66,7 @@ class Rows(QStyledItemDelegate):
         mesh = self._tree.mesh_of(item)
         colour = "accent" if chosen else "dim" if mesh.hidden or item.hidden else "text"
         side = float(look.icon - 4)
-        paint_icon(painter, "mesh" if isinstance(item, MeshObject) else "groom",
+        paint_icon(painter, self._tree.picture_of(item),
                    QRectF(area.left() + 2, area.center().y() - side / 2, side, side),
                    look.theme.colour("accent" if chosen else "dim"))
         inside = area.adjusted(side + 8, 0, -2.0 * look.icon, 0)
@@ -159,6 +159,12 @@ class Outliner(QTreeView):
     def mesh_of(self, item: Item) -> MeshObject:
         """The mesh itself, or the one a groom grows on."""
         return item if isinstance(item, MeshObject) else find_mesh(self._desk.document, item.mesh_id)
+
+    def picture_of(self, item: MeshObject | Groom) -> str:
+        """The icon of a row: of a mesh, of hair, or of feathers whose keys a groom holds."""
+        if isinstance(item, MeshObject):
+            return "mesh"
+        return "groom" if feathers_of(self._desk.document, item) is None else "feather"
 
     @property
     def chosen(self) -> Item | None:

@@ -65,6 +65,7 @@ def test_the_panel_of_keys_is_that_of_their_feathers(desk: Desk, qtbot: QtBot) -
 def test_deleting_the_keys_takes_their_feathers_too(desk: Desk, qtbot: QtBot) -> None:
     tree = Outliner(desk)
     qtbot.addWidget(tree)
+    assert [tree.picture_of(item) for item in (desk.document.meshes[0], desk.document.grooms[0])] == ["mesh", "feather"]
     tree.delete(desk.groom)
     assert desk.document.feathers == ()
     assert desk.document.grooms == ()

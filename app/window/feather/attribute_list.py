@@ -16,11 +16,13 @@ from app.window.fields.number_bar import NumberBar
 from app.window.fields.value_field import ValueField
 from app.window.params_panel import Setting
 from app.window.sections import Row
+from app.window.theme import look_of
 from core.feather.attributes import ATTRIBUTES, COLUMNS, GROUPS, SHAPE_NAMES, Attribute
 from core.field import Field
 from core.value import Value, constant
 
 CHANGED = "changed here"
+LABEL = 15  # heights of the text
 MOST_FOUND = 40  # rows for a word; a longer list is not read
 _GROUP = Field("Group", "Which of the attributes are listed below: those of one group, or those changed here.")
 
@@ -42,6 +44,14 @@ def found(word: str, group: str, changed: Sequence[str]) -> list[str]:
     if group == CHANGED:
         return [known.name for known in ATTRIBUTES if known.name in changed]
     return [known.name for known in ATTRIBUTES if known.group == group]
+
+
+class _Row(Row):
+    """A row with room for the long names of attributes."""
+
+    def _measure(self) -> None:
+        look = look_of()
+        self.label.setFixedSize(LABEL * look.text, look.row)
 
 
 class AttributeList(QWidget):
@@ -132,7 +142,7 @@ class AttributeList(QWidget):
             bar.setObjectName(name)
             bar.edited.connect(lambda given, final, name=name: self.edited.emit(
                 name, given if isinstance(given, Value) else constant(given), final))
-            row = Row(known.label, bar)
+            row = _Row(known.label, bar)
             row.label.setToolTip(f"<p style='white-space:normal'>{known.tooltip}</p>")
             together.add(bar.bar if isinstance(bar, ValueField) else bar, row.label)
             column.addWidget(row)

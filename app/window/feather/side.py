@@ -40,6 +40,7 @@ from core.workspace import Workspace
 NO_OTHER = "none"
 EDGE, BARB = "outline", "barb"
 LEVEL_NAMES = ("card", "vane", "barbs", "barbules")
+PICTURES = 0.45  # of the height, at first
 TOLD = 3  # attributes two feathers differ in most, by name
 _PART = Field("Part", "Whose feather is shown: of the body, or of a part of the bird with feathers of its own.")
 _LEVEL = Field("Level", "How finely the feather in space is made: from a card with a picture to every barbule.")
@@ -93,7 +94,7 @@ class FeatherSide(QWidget):
         self.attributes = AttributeList()
         self.placements = PlacementList(desk)
         self._asked: tuple[object, ...] = ()
-        self._busy = False
+        self._busy = self._laid = False
         self._lay_out(memory)
         self.canvas.drawn.connect(self._line_drawn)
         self.attributes.edited.connect(self._attribute_edited)
@@ -130,12 +131,11 @@ class FeatherSide(QWidget):
         below.add(Section("Another feather", other, memory, "feather other"))
         below.add(Section("Placement", self.placements, memory, "feather placement"))
         below.add(Section("Attributes", self.attributes, memory, "feather attributes"))
-        parts = QSplitter(Qt.Orientation.Vertical)
+        parts = self._parts = QSplitter(Qt.Orientation.Vertical)
         parts.setChildrenCollapsible(False)
         parts.setHandleWidth(look_of().grid)
         parts.addWidget(above)
         parts.addWidget(below)
-        parts.setSizes([50, 50])
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(parts)
@@ -320,6 +320,9 @@ class FeatherSide(QWidget):
 
     def showEvent(self, event: object) -> None:
         super().showEvent(event)  # type: ignore[arg-type]
+        if not self._laid:
+            self._laid = True
+            self._parts.setSizes([round(PICTURES * self.height()), round((1.0 - PICTURES) * self.height())])
         self.refresh()
 
     def _document_changed(self, old: Document, new: Document) -> None:
