@@ -1,7 +1,8 @@
 """10,000 feathers against as many bare instances of one feather in Blender: built for the view, and written as USD.
 
 Needs FILOPLUME_PEERS (see blender_reads). Ours is shaped, layered and settled before either is timed, as it is on
-every redraw and every export; what that costs is in the benchmark of feathers. Ours come with normals, colours and opacity.
+every redraw and every export; what that costs is in the benchmark of feathers. Our triangles come with normals,
+colours and opacity.
 """
 
 from __future__ import annotations
