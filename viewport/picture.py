@@ -22,7 +22,7 @@ MOST_HAIRS = 1_000_000  # of one coat in a picture; twenty for every pixel of th
 
 def render(
     scene: Scene, camera: Camera, width: int = 1600, height: int = 1000, samples: int = 2,
-    progress: Progress | None = None, ctx: moderngl.Context | None = None, kept: Renderer | None = None,
+    progress: Progress | None = None, ctx: moderngl.Context | None = None,
 ) -> NDArray[np.uint8]:
     """Draw the scene and return it as (height, width, 3) uint8, sRGB, top row first.
 
@@ -32,8 +32,7 @@ def render(
     ----------
     samples : samples on a side of every pixel, 1 to 4; hairs are filtered in any case, 2 is a finished picture.
     progress : called with the done part 0 .. 1; an exception raised in it stops the drawing and is passed on.
-    ctx : a context to draw in; by default one is made for this picture. kept : a renderer of it that is kept for
-        more pictures than this one.
+    ctx : a context to draw in; by default one is made for this picture.
 
     Raises
     ------
@@ -51,13 +50,12 @@ def render(
     scene = scene._replace(coats=tuple(thinned(coat, MOST_HAIRS) for coat in scene.coats))
     color = ctx.renderbuffer((width, height), 3)
     target = ctx.framebuffer([color])
-    renderer = kept or Renderer(ctx)
+    renderer = Renderer(ctx)
     try:
         renderer.draw(scene, camera, target, (width, height), samples, progress)
         data = target.read(components=3, alignment=1)
     finally:
-        if kept is None:
-            renderer.release()
+        renderer.release()
         target.release()
         color.release()
     return np.ascontiguousarray(np.frombuffer(data, np.uint8).reshape(height, width, 3)[::-1])

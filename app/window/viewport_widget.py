@@ -186,17 +186,34 @@ class Viewport(QOpenGLWindow):
             self._lent -= 1
             self.redraw()
 
-    def draw_beside(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8] | None:
-        """A small scene of a panel, drawn at once: (height, width, 3) uint8 sRGB; None while nothing can be drawn."""
-        if self._ctx is None:
-            return None
-        from viewport.picture import render
+    def draw_beside(
+        self, scene: Scene, camera: Camera, size: tuple[int, int]
+    ) -> Iterator[NDArray[np.uint8] | None]:
+        """Draw a small scene of a panel in short slices; the last item is (height, width, 3) uint8 sRGB."""
+        ctx = self._ctx
+        if ctx is None:
+            return
         from viewport.renderer import Renderer
 
         self.makeCurrent()
         if self._beside is None:
-            self._beside = Renderer(self._ctx)
-        return render(scene, camera, *size, ctx=self._ctx, kept=self._beside)
+            self._beside = Renderer(ctx)
+        renderer, color = self._beside, ctx.renderbuffer(size, 3)
+        target = ctx.framebuffer([color])
+        try:
+            for _ in renderer.steps(scene, camera, target, size, 2):
+                ctx.finish()
+                yield None
+                if self._beside is not renderer:  # the window was closed
+                    return
+                self.makeCurrent()
+            pixels = np.frombuffer(target.read(components=3, alignment=1), np.uint8).reshape(size[1], size[0], 3)
+            yield np.ascontiguousarray(pixels[::-1])
+        finally:
+            if self._beside is renderer:
+                self.makeCurrent()
+                target.release()
+                color.release()
 
     def gate_rect(self) -> QRect:
         """What the film gate takes of the view in device pixels; all of it where none is shown."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtCore import QPointF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
@@ -22,7 +23,9 @@ NEARER = 1.15  # for a notch of the wheel
 
 COARSE = 2  # pixels for one while a hand turns it
 
-Draw = Callable[[Scene, Camera, tuple[int, int]], "NDArray[np.uint8] | None"]
+SLICE = 0.012  # seconds of drawing, before the window has its turn
+
+Draw = Callable[[Scene, Camera, tuple[int, int]], Iterator["NDArray[np.uint8] | None"]]
 
 
 class SolidView(QWidget):
@@ -30,7 +33,7 @@ class SolidView(QWidget):
 
     Parameters
     ----------
-    draw : a scene as (height, width, 3) uint8 sRGB, or None while nothing can be drawn.
+    draw : draws a scene in short slices; the last item is (height, width, 3) uint8 sRGB.
     """
 
     def __init__(self, draw: Draw, parent: QWidget | None = None) -> None:
@@ -40,6 +43,9 @@ class SolidView(QWidget):
         self.turned, self.tilted = USUAL
         self.zoom = 1.0
         self._image: QImage | None = None
+        self._steps: Iterator[NDArray[np.uint8] | None] | None = None
+        self._slices = QTimer(self)
+        self._slices.timeout.connect(self._on)
         self._last: QPointF | None = None
         self.setMinimumSize(120, 160)
         self.setCursor(Qt.CursorShape.OpenHandCursor)
@@ -55,8 +61,34 @@ class SolidView(QWidget):
         self._again()
 
     def _again(self) -> None:
-        self._image = None
-        self.update()
+        """Draw anew, a little at a time; the picture there is stays until then."""
+        self._steps = None
+        if self.mesh is None:
+            self._image = None
+            self._slices.stop()
+            self.update()
+            return
+        ratio = self.devicePixelRatioF() / (1 if self._last is None else COARSE)
+        wide, high = max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
+        scene = Scene(feathers=(self.mesh,), background=BEHIND)
+        self._steps = self._draw(scene, self.camera(wide / high), (wide, high))
+        self._slices.start(0)
+
+    def _on(self) -> None:
+        """One slice of drawing."""
+        start = time.perf_counter()
+        while self._steps is not None and time.perf_counter() - start < SLICE:
+            try:
+                seen = next(self._steps)
+            except StopIteration:
+                self._steps = None
+                break
+            if seen is not None:
+                high, wide = seen.shape[:2]
+                self._image = QImage(seen.tobytes(), wide, high, 3 * wide, QImage.Format.Format_RGB888).copy()
+                self.update()
+        if self._steps is None:
+            self._slices.stop()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -97,14 +129,6 @@ class SolidView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(66, 66, 66))
-        if self.mesh is None:
-            return
-        if self._image is None:
-            ratio = self.devicePixelRatioF() / (1 if self._last is None else COARSE)
-            wide, high = max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
-            seen = self._draw(Scene(feathers=(self.mesh,), background=BEHIND), self.camera(wide / high), (wide, high))
-            if seen is None:
-                return
-            self._image = QImage(seen.tobytes(), wide, high, 3 * wide, QImage.Format.Format_RGB888).copy()
-            self._image.setDevicePixelRatio(ratio)
-        painter.drawImage(0, 0, self._image)
+        if self._image is not None:
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+            painter.drawImage(self.rect(), self._image)

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PySide6.QtCore import QPoint, Qt
 from pytestqt.qtbot import QtBot
 
 from app.window.desk import Desk
@@ -32,7 +33,7 @@ def side(qtbot: QtBot) -> Iterator[FeatherSide]:
     coat = FeatherCoat(id=1, name="coat", mesh_id=groom.mesh_id, keys_id=groom.id)
     desk = Desk(Session(with_feathers(document.replace(feathers=()), coat)))
     desk.set_workspace(groom=groom.id)
-    side = FeatherSide(desk, lambda scene, camera, size: None)
+    side = FeatherSide(desk, lambda scene, camera, size: iter((None, np.full((size[1], size[0], 3), 7, np.uint8))))
     qtbot.addWidget(side)
     side.resize(500, 900)
     side.show()
@@ -118,6 +119,19 @@ def test_lines_drawn_over_the_flat_feather_become_its_edge_and_its_barbs(side: F
     qtbot.waitUntil(lambda: side.desk.session.history.undo_name == "Draw barb of feather", timeout=60_000)
     assert worn(side)[COLUMNS["barbAngleMiddleRight"]] != before[COLUMNS["barbAngleMiddleRight"]]
     assert abs(worn(side)[COLUMNS["barbCurveRight"]]) < 1e-6  # it was drawn straight
+
+
+def test_the_feather_in_space_is_drawn_in_slices_and_turned_by_hand(side: FeatherSide, qtbot: QtBot) -> None:
+    qtbot.waitUntil(lambda: side.solid._image is not None and not side.solid._slices.isActive())
+    assert side.solid._image is not None
+    wide = side.solid._image.width()
+    before = side.solid.camera(1.0).world_from_camera
+    qtbot.mousePress(side.solid, Qt.MouseButton.LeftButton, pos=QPoint(40, 60))
+    qtbot.mouseMove(side.solid, QPoint(90, 60))
+    qtbot.waitUntil(lambda: side.solid._image is not None and side.solid._image.width() < wide)  # coarse meanwhile
+    qtbot.mouseRelease(side.solid, Qt.MouseButton.LeftButton, pos=QPoint(90, 60))
+    qtbot.waitUntil(lambda: side.solid._image is not None and side.solid._image.width() == wide)
+    assert not np.allclose(side.solid.camera(1.0).world_from_camera, before)
 
 
 def test_without_feathers_at_hand_the_editor_says_how_to_get_some(side: FeatherSide) -> None:
