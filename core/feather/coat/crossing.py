@@ -340,7 +340,8 @@ def touching_boxes(boxes: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArr
 def neighbour_rows(count: int, first: NDArray[np.int32], second: NDArray[np.int32]) -> Pairs:
     """The pairs as rows of neighbours of each of `count` feathers."""
     own, other = np.concatenate([first, second]), np.concatenate([second, first])
-    order = np.argsort(own, kind="stable")
+    # the same order either way; numpy sorts whole numbers of 16 bits by radix, in a fraction of the time
+    order = np.argsort(own.astype(np.uint16) if count <= 1 << 16 else own, kind="stable")
     start = np.zeros(count + 1, np.int32)
     np.cumsum(np.bincount(own, minlength=count), out=start[1:])
     return Pairs(start, other[order].astype(np.int32))
