@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from app.window.desk import Desk
 from app.window.feather.attribute_list import CHANGED, found
-from app.window.feather.side import BARB, FeatherSide
+from app.window.feather.side import BARB, FeatherSide, Shown, made
 from app.window.fields.value_field import ValueField
 from core.document import with_feathers
 from core.feather.attributes import ATTRIBUTES, COLUMNS, GROUPS
@@ -24,10 +24,21 @@ from core.value import constant
 from tests.documents import small_document
 from tools.session import Session
 
+MADE: dict[tuple[bytes, str, bool], Shown] = {}
+
+
+def made_once(values: np.ndarray, level: str, other: np.ndarray | None) -> Shown:
+    """A feather as the editor shows it; the one all tests begin with is made for the first of them."""
+    key = values.tobytes(), level, other is None
+    if other is not None or key not in MADE:
+        MADE[key] = made(values, level, other)
+    return MADE[key]
+
 
 @pytest.fixture
-def side(qtbot: QtBot) -> Iterator[FeatherSide]:
+def side(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[FeatherSide]:
     """The editor of a goldfinch's coat, whose keys are at hand."""
+    monkeypatch.setattr("app.window.feather.side.made", made_once)
     document = small_document()
     groom = document.grooms[0]
     coat = FeatherCoat(id=1, name="coat", mesh_id=groom.mesh_id, keys_id=groom.id)
