@@ -22,7 +22,7 @@ from tests.bench.bench import Row, median_ms
 from tests.documents import grid_mesh, guides_on
 from tools.session import Session
 
-TITLE = "document"
+TITLE = "The document"
 GUIDES, POINTS, SIDE, SHARE = 20_000, 16, 317, 0.05  # 317 x 317 quads, cut, are 200,978 triangles
 
 

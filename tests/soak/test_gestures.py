@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from core.document import Document, problems
-from tests.window.conftest import OFFSCREEN, Opened, animal, home, opened  # noqa: F401 (fixtures)
+from tests.window.conftest import OFFSCREEN, Opened, animal, evaluator, home, opened  # noqa: F401 (fixtures)
 from tests.window.hand import ALT, CTRL, LEFT, MIDDLE, NONE, RIGHT, SHIFT, Hand
 
 GESTURES = int(os.environ.get("FILOPLUME_GESTURES", "5000"))
