@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
@@ -24,6 +24,7 @@ class ViewHost(QWidget):
         self.container.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.container.setMinimumSize(160, 120)
         self.container.setAcceptDrops(True)
+        self.container.installEventFilter(self)
         self.trouble = QLabel()
         self.trouble.setWordWrap(True)
         self.trouble.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -43,6 +44,12 @@ class ViewHost(QWidget):
     def shows_picture(self) -> bool:
         """True when the viewport is on the screen, wherever."""
         return self.viewport.isExposed()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """The container has its new size before the viewport, which the window system resizes, hears of it."""
+        if event.type() == QEvent.Type.Resize:
+            self.viewport.await_size()
+        return super().eventFilter(watched, event)
 
     def float_out(self) -> None:
         """Give the viewport a window of its own; closing that brings it back."""

@@ -97,6 +97,7 @@ class Viewport(QOpenGLWindow):
         self._screen: moderngl.Framebuffer | None = None
         self._stale = True
         self._wants_paint = True
+        self._awaits_size = False  # the window system has been asked for another size
         self._lent = 0  # to who draws frames with it
         self._moved = False  # the picture being painted was drawn anew
         self._pointer: Pointer | None = None
@@ -142,6 +143,10 @@ class Viewport(QOpenGLWindow):
         self._stale = True
         self._rest.stop()
         self.repaint_soon()
+
+    def await_size(self) -> None:
+        """Another size is on its way: the next picture waits one turn for it, or it would be drawn twice."""
+        self._awaits_size = True
 
     @property
     def pending(self) -> bool:
@@ -405,6 +410,10 @@ class Viewport(QOpenGLWindow):
         """Gathered samples go to the hand just before a picture; keys of what goes on here are no hotkeys."""
         kind = event.type()
         if kind == QEvent.Type.UpdateRequest:
+            if self._awaits_size:
+                self._awaits_size = False
+                self.update()
+                return True
             self._frame()
         elif kind == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
             if self.gestures.takes(Qt.Key(event.key())):
@@ -430,6 +439,7 @@ class Viewport(QOpenGLWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Another size is another picture."""
         super().resizeEvent(event)
+        self._awaits_size = False
         self.eye.resized()
         self.redraw()
 
