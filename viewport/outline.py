@@ -32,7 +32,7 @@ def outline_points(scene: Scene) -> NDArray[np.float32]:
     if not arrays:
         return np.zeros((0, 3), np.float32)
     points = np.concatenate(arrays)
-    across = np.ptp(points, axis=0)
+    across = np.ptp(points[:: 1 + len(points) // POINTS_AT_ONCE], axis=0)
     spread = _SPREAD / np.maximum(across, 1e-6 * max(float(across.max()), 1e-30))  # as even for flat and long scenes
     return _outermost(_outermost(points, spread), spread)
 
@@ -58,7 +58,8 @@ class Outline:
         """See :func:`outline_points`."""
         key = (
             *(surface.points for surface in scene.surfaces), *(coat.points for coat in scene.coats),
-            *(lines.points for lines in scene.guides), *(mesh.points for mesh in scene.feathers),
+            *(lines.points for lines in scene.guides),
+            *(mesh.points for mesh in scene.quick_feathers or scene.feathers),
         )
         if not same(self._key, key):
             self._key, self._points = key, outline_points(scene)

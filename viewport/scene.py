@@ -180,7 +180,8 @@ def root_normals(points: np.ndarray, surface: Surface) -> Floats:
 
 def all_points(scene: Scene) -> list[np.ndarray]:
     """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (some of many)."""
-    found = [surface.points for surface in scene.surfaces] + [mesh.points for mesh in scene.feathers]
+    found = [surface.points for surface in scene.surfaces]
+    found += [mesh.points for mesh in scene.quick_feathers or scene.feathers]
     for points in [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]:
         axis = 2 if points.shape[1] == 3 else 1
         points = points[:: 1 + len(points) // MOST_BOUNDING]

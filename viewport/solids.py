@@ -111,7 +111,7 @@ class Solids:
         slices = [(feathers, part) for feathers in drawn for part in feathers.slices]
         for number, (feathers, part) in enumerate(slices):
             self._begin(target)
-            feathers.draw(uniforms, part)
+            feathers.draw(uniforms, part, quick)
             self._end()
             yield (number + 1) / len(slices)
 

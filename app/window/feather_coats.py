@@ -27,6 +27,7 @@ def dress_with_feathers(desk: Desk, item: MeshObject, bird: str, owner: QObject 
     evaluator = desk.session.evaluator
 
     def work(progress: Progress, cancelled: Asked) -> Dressed:
+        import tools.feather_edits  # noqa: F401 - with its kernels, so that the window need not wait for them
         from core.feather.coat.dress import dress_feathers
 
         return dress_feathers(item.mesh, evaluator, FEATHERS, bird, mesh_id=item.id)

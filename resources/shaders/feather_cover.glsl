@@ -1,13 +1,4 @@
 // How much of what is behind it a feather hides: more or fewer samples are kept, by a noise that is fixed on the screen.
-uniform bool has_picture;
-uniform sampler2D picture;
-uniform vec2 picture_corner, picture_extent;
-
-vec4 picture_at(vec2 place)
-{
-    return texture(picture, (place - picture_corner) / picture_extent);
-}
-
 float screen_noise(vec2 pixel)   // interleaved gradient noise, Jimenez 2014
 {
     return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));

@@ -152,32 +152,67 @@ def test_the_grid_adapts_its_step_and_faces_orthographic_views(picture):
         assert "".join("xyz"[int(np.argmax(axis))] for axis in found) == axes
 
 
-def test_quick_light_at_the_vertices_is_that_of_every_sample(ctx):
+@pytest.fixture
+def both_ways(ctx):
+    """both_ways(scene, camera, draw(solids, target, uniforms, quick), **uniforms) -> finely and quickly, (H, W, 4)."""
+    things = [Renderer(ctx, shadow_side=256), ctx.texture((W, H), 4, dtype="f4"), ctx.depth_renderbuffer((W, H))]
+    renderer, color, depth = things
+    target = ctx.framebuffer([color], depth)
+
+    def call(scene, cam, draw, **uniforms):
+        steps, images = renderer.prepare(scene, cam, (W, H)), []
+        while True:
+            try:
+                next(steps)
+            except StopIteration as end:
+                lit = lit_uniforms(scene, cam, end.value.uniforms | uniforms)
+                break
+        assert isinstance(renderer.solids, Solids)
+        renderer.solids.upload(scene, quick=True)
+        for quick in (False, True):
+            target.clear(depth=1.0)
+            renderer.light_maps.bind()
+            draw(renderer.solids, target, lit, quick)
+            images.append(np.frombuffer(color.read(), np.float32).reshape(H, W, 4).copy())
+        return images
+
+    yield call
+    for thing in (target, *things):
+        thing.release()
+
+
+def test_quick_light_at_the_vertices_is_that_of_every_sample(both_ways):
     skin, _ = ball(1)
     skin = skin._replace(color=(0.4, 0.35, 0.3), covered=False)
-    scene, cam = Scene((skin,)), camera()
-    renderer = Renderer(ctx, shadow_side=256)
-    steps = renderer.prepare(scene, cam, (W, H))
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            prepared = end.value
-            break
-    color, depth = ctx.texture((W, H), 4, dtype="f4"), ctx.depth_renderbuffer((W, H))
-    target = ctx.framebuffer([color], depth)
-    images = []
-    for quick in (False, True):
-        target.clear(depth=1.0)
-        renderer.light_maps.bind()
-        assert isinstance(renderer.solids, Solids)
-        renderer.solids.fill(scene, target, lit_uniforms(scene, cam, prepared.uniforms), PLAIN, quick)
-        images.append(np.frombuffer(color.read(), np.float32).reshape(H, W, 4).copy())
-    assert np.array_equal(images[0][..., 3] > 0.5, images[1][..., 3] > 0.5)
-    lit = images[0][..., 3] > 0
-    assert np.abs(images[0] - images[1])[lit].mean() < 0.03 * images[0][lit].mean()
-    for thing in (target, depth, color, renderer):
-        thing.release()
+    scene = Scene((skin,))
+    fine, quick = both_ways(
+        scene, camera(), lambda solids, target, lit, quick: solids.fill(scene, target, lit, PLAIN, quick))
+    assert np.array_equal(fine[..., 3] > 0.5, quick[..., 3] > 0.5)
+    lit = fine[..., 3] > 0
+    assert np.abs(fine - quick)[lit].mean() < 0.03 * fine[lit].mean()
+
+
+@pytest.mark.parametrize("pictured", [False, True])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_feathers_lit_at_their_vertices_look_like_those_lit_at_every_sample(both_ways, pictured, side):
+    mesh = feather_mesh(preset_values("goldfinch-breast"), 0, "vane")
+    if pictured:  # brown, with a bar across
+        photograph = np.full((16, 8, 4), (150, 110, 60, 255), np.uint8)
+        photograph[6:9, :, :3] = 40
+        low, high = mesh.flat.min(axis=0), mesh.flat.max(axis=0)
+        mesh = mesh._replace(picture=photograph, corner=tuple(low), extent=tuple(high - low))
+    scene = Scene(feathers=(mesh,), quick_feathers=(mesh,))
+
+    def draw(solids, target, lit, quick):
+        for _ in solids.plumage(target, lit, quick):
+            pass
+
+    fine, quick = both_ways(scene, frame_points(mesh.points, (0.3, 0.2, side), W / H), draw, to_display=True)
+    covered = (fine[..., 3] > 0.5) & (quick[..., 3] > 0.5)
+    assert covered.sum() > 2000
+    assert np.array_equal(fine[..., 3] > 0.5, quick[..., 3] > 0.5)
+    assert np.abs(fine - quick)[covered].mean() < (0.06 if pictured else 0.03)
+    assert np.ptp(quick[covered][:, 0]) > 0.2
 
 
 def test_edges_of_triangles_are_found_once():

@@ -17,21 +17,24 @@ COLUMNS = (
     ("colors", "3f", "in_color"), ("light", "4f", "in_light"), ("film", "2f", "in_film"),
     ("opacity", "1f", "in_opacity"), ("flat", "2f", "in_flat"),
 )  # fmt: skip
+EVERYTHING = tuple(name for name, _, _ in COLUMNS)
 IN_DEPTH = ("points", "opacity", "flat")
 
 
 class FeatherPrograms:
-    """The programs all feathers are drawn with: in light, and as depth alone."""
+    """The programs all feathers are drawn with: in light, lit at vertices alone, and as depth alone."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
-        common = ("display.glsl", "lighting.glsl", "feather_cover.glsl")
-        self.shaded = program(ctx, ("feather.vert",), (*common, "feather.frag"))
-        self.depth = program(ctx, ("feather_depth.vert",), ("feather_cover.glsl", "feather_depth.frag"))
+        paint, cover = "feather_paint.glsl", "feather_cover.glsl"
+        light = ("display.glsl", "lighting.glsl", "feather_light.glsl", paint)
+        self.shaded = program(ctx, ("feather.vert",), (*light, cover, "feather.frag"))
+        self.quick = program(ctx, (*light, "feather_quick.vert"), (paint, cover, "feather_quick.frag"))
+        self.depth = program(ctx, ("feather_depth.vert",), (paint, cover, "feather_depth.frag"))
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        self.shaded.release()
-        self.depth.release()
+        for thing in (self.shaded, self.quick, self.depth):
+            thing.release()
 
 
 class FeatherDrawable:
@@ -48,11 +51,12 @@ class FeatherDrawable:
             self.picture = ctx.texture((wide, high), 4, np.ascontiguousarray(mesh.picture).tobytes())
             self.picture.build_mipmaps()
             self.picture.repeat_x = self.picture.repeat_y = False
-        self.shaded, self.depth = (
+        self.shaded, self.quick, self.depth = (
             ctx.vertex_array(prog, [
                 (self.buffers[name], kind, given) for name, kind, given in COLUMNS if name in wanted
             ], index_buffer=self.indices, index_element_size=4)
-            for prog, wanted in ((programs.shaded, [name for name, _, _ in COLUMNS]), (programs.depth, IN_DEPTH))
+            for prog, wanted in (
+                (programs.shaded, EVERYTHING), (programs.quick, EVERYTHING), (programs.depth, IN_DEPTH))
         )  # fmt: skip
 
     def holds(self, mesh: FeatherMesh) -> bool:
@@ -80,11 +84,11 @@ class FeatherDrawable:
         count = len(self.mesh.triangles)
         return [(first, min(AT_ONCE, count - first)) for first in range(0, count, AT_ONCE)]
 
-    def draw(self, uniforms: dict[str, Any], part: tuple[int, int]) -> None:
-        """Draw some triangles in light; with the uniforms of lighting.glsl."""
+    def draw(self, uniforms: dict[str, Any], part: tuple[int, int], quick: bool = False) -> None:
+        """Draw some triangles in light; with the uniforms of lighting.glsl. quick : lit at their vertices alone."""
         optics = self.mesh.optics
         more = {"under": optics.under, "film_index": optics.film_index, "film_spread": optics.film_spread}
-        self._render(self.shaded, {**uniforms, **more}, part)
+        self._render(self.quick if quick else self.shaded, {**uniforms, **more}, part)
 
     def draw_depth(self, clip_from_world: np.ndarray, part: tuple[int, int]) -> None:
         """Draw the depth of some triangles alone."""
@@ -101,7 +105,7 @@ class FeatherDrawable:
 
     def release(self) -> None:
         """Give back the memory; the context must be current."""
-        for thing in (self.shaded, self.depth, *self.buffers.values(), self.indices, self.picture):
+        for thing in (self.shaded, self.quick, self.depth, *self.buffers.values(), self.indices, self.picture):
             if thing is not None:
                 thing.release()
 
