@@ -23,7 +23,7 @@ from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids, lit_uniforms
 
 LARGEST_TILE = 4096  # samples on a side
-TILE_STEP = 256  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
+TILE_STEP = 512  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
 MUCH_TOO_LARGE = 5.0  # times; a window paints with one sample and with four in turns
 SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps
 
