@@ -80,6 +80,7 @@ class Viewport(QOpenGLWindow):
         self.setFormat(surface_format())
         self.desk = desk
         self.playing = False
+        self._window = window
         self.views = PoseViews(desk)
         self.views.fresh.connect(self.redraw)
         self._pane = 0  # the one the pointer is in
@@ -580,8 +581,8 @@ class Viewport(QOpenGLWindow):
 
     def _take_focus(self) -> None:
         """Keys go where the hand is, unless something is being typed."""
-        focus = QGuiApplication.focusObject()
-        typing = focus is not None and focus.inherits("QWidget") and focus.property("readOnly") is not None
+        focus = self._window.focusWidget()  # also while a closing menu has left no window with the keyboard
+        typing = focus is not None and focus.property("readOnly") is not None
         if not typing and QGuiApplication.focusWindow() is not None and not self.isActive():
             return
         if not typing:

@@ -145,6 +145,8 @@ class _Parser:
         return token
 
     def expect(self, text: str) -> None:
+        if self.token.kind == "end" and text == ")":
+            raise self.fail("a bracket is not closed: add ')'.", self.token)
         if self.token.text != text or self.token.kind == "end":
             raise self.fail(f"expected {text!r}, found {self.shown(self.token)}.", self.token)
         self.advance()
@@ -231,7 +233,7 @@ class _Parser:
             raise self.fail(f"there is no function {token.text!r}{_nearest(token.text, FUNCTIONS)}.", token)
         self.advance()
         count = 0
-        while self.token.text != ")":
+        while self.token.text != ")" and self.token.kind != "end":
             if count:
                 self.expect(",")
             if count == function.most:

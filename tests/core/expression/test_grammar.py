@@ -62,6 +62,7 @@ def test_examples(source, truth):
 
 
 @pytest.mark.parametrize(("source", "column", "words"), [
+    ("1 + 0.8*sin(u*20", 17, "a bracket is not closed"), ("(1 + 2", 7, "a bracket is not closed"),
     ("", 1, "the end"), ("1 +", 4, "the end"), ("1 + * 2", 5, "'*'"), ("(1", 3, "')'"), ("1)", 2, "operator"),
     ("1 2", 3, "operator"), ("foo(1)", 1, "no function 'foo'"), ("2 + sinn(1)", 5, "did you mean 'sin'"),
     ("1 + lenght", 5, "no value named 'lenght'"), ("u.real", 2, "'.'"), ("u[0]", 2, "'['"), ("'a'", 1, "meaning"),
