@@ -23,6 +23,7 @@ from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids, lit_uniforms
 
 LARGEST_TILE = 4096  # samples on a side
+MOST_SAMPLES = 1 << 23  # of a tile: memory for many more takes longer to get than a window may stand still
 TILE_STEP = 512  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
 MUCH_TOO_LARGE = 5.0  # times; a window paints with one sample and with four in turns
 SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps
@@ -224,6 +225,7 @@ class Renderer:
                 return
             self.tile.release()
             self.tile = None
+            yield 0.0
         light = self.ctx.texture((wide, high), 4, dtype="f2")
         light.filter = (moderngl.NEAREST, moderngl.NEAREST)
         yield 0.0
@@ -289,12 +291,15 @@ def light_uniforms(scene: Scene, toward: dict[str, NDArray[np.float64]]) -> dict
 
 
 def _tiles(size: tuple[int, int], samples: int) -> list[tuple[int, int, int, int]]:
-    """Rectangles x, y, width, height in pixels that cover the picture, at most LARGEST_TILE samples a side."""
-    side = max(1, LARGEST_TILE // samples)
+    """Even rectangles x, y, width, height in pixels that cover the picture, with at most MOST_SAMPLES samples each."""
     width, height = size
+    columns = -(-width * samples // LARGEST_TILE)
+    across = -(-width // columns)
+    rows = -(-height * samples // min(LARGEST_TILE, max(MOST_SAMPLES // (across * samples), 1)))
+    up = -(-height // rows)
     return [
-        (x, y, min(side, width - x), min(side, height - y))
-        for y in range(0, height, side) for x in range(0, width, side)
+        (x, y, min(across, width - x), min(up, height - y))
+        for y in range(0, height, up) for x in range(0, width, across)
     ]
 
 
