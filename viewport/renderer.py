@@ -23,7 +23,7 @@ from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids, lit_uniforms
 
 LARGEST_TILE = 4096  # samples on a side
-MOST_SAMPLES = 1 << 23  # of a tile: memory for many more takes longer to get than a window may stand still
+MOST_SAMPLES = 6_500_000  # of a tile: memory for many more takes longer to get than a window may stand still
 TILE_STEP = 512  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
 MUCH_TOO_LARGE = 5.0  # times; a window paints with one sample and with four in turns
 SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps

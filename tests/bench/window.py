@@ -272,7 +272,7 @@ class _Bench:
         QTest.mouseRelease(view, left, Qt.KeyboardModifier.NoModifier, QPoint(x + 70, y - 24))
 
     def commands(self) -> list[Row]:
-        """Every command of the palette that asks nothing, once."""
+        """Every command of the palette that asks nothing, once, each when what the last caused is done."""
         from PySide6.QtTest import QTest
         from PySide6.QtWidgets import QApplication
 
@@ -288,6 +288,7 @@ class _Bench:
                 for popup in (QApplication.activePopupWidget(), QApplication.activeModalWidget()):
                     if popup is not None:
                         popup.close()
+                self.until(lambda: self.window.settled, 60)
         return beat.rows("all commands")
 
 
