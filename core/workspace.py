@@ -76,6 +76,11 @@ class ViewOptions(Record):
         if self.shading not in SHADINGS:
             raise ValueError(f"ViewOptions.shading must be one of {', '.join(SHADINGS)}, not {self.shading!r}")
 
+    @property
+    def edges(self) -> bool:
+        """True when the edges of polygons are drawn."""
+        return self.wire or self.shading in ("wire", "lines")
+
 
 class Workspace(Record):
     """Where the artist left off.

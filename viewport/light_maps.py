@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from viewport.drawables.strands import CoatDrawable
 from viewport.outline import extent
 from viewport.scene import Scene, direction
+from viewport.shaders import program, set_uniforms
 from viewport.strand_textures import points_by_axis
 
 LITTLE_TURN = float(np.cos(np.radians(4.0)))
@@ -77,6 +78,8 @@ class LightMaps:
         self.skin_target = ctx.framebuffer([], self.skin_depth)
         self.first_target = ctx.framebuffer([], self.first_depth)
         self.sums_target = ctx.framebuffer([self.sums])
+        self.depth_copy = program(ctx, ("fullscreen.vert",), ("depth_copy.frag",))
+        self.whole = ctx.vertex_array(self.depth_copy, [])
 
     def draw(
         self, scene: Scene, toward: NDArray[np.float64], cast_shadows: Callable[[NDArray[np.float64]], Iterable[None]],
@@ -96,16 +99,14 @@ class LightMaps:
         ends = tuple(float(v) for v in LAYERS * length)
         ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
         ctx.enable(moderngl.DEPTH_TEST)
-        for target in (self.skin_target, self.first_target):
-            target.use()
-            target.clear(depth=1.0)
-            for _ in cast_shadows(matrix):
-                yield
-                target.use()
-                ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
-                ctx.enable(moderngl.DEPTH_TEST)
-        self.first_target.use()
-        ctx.enable(moderngl.DEPTH_TEST)
+        self.skin_target.use()
+        self.skin_target.clear(depth=1.0)
+        for _ in cast_shadows(matrix):
+            yield
+            self.skin_target.use()
+            ctx.disable(moderngl.BLEND | moderngl.CULL_FACE)
+            ctx.enable(moderngl.DEPTH_TEST)
+        self._copy_skin()
         for coat in coats:
             for _ in coat.draw_depth(matrix):
                 yield
@@ -133,6 +134,16 @@ class LightMaps:
             "skin_bias": max(0.12 * length, 4.0 * texel),
         }
 
+    def _copy_skin(self) -> None:
+        """Begin the nearest depths of hair or skin with those of skin."""
+        self.first_target.use()
+        self.ctx.enable(moderngl.DEPTH_TEST)
+        self.ctx.depth_func = "1"
+        self.skin_depth.use(5)
+        set_uniforms(self.depth_copy, {"depths": 5})
+        self.whole.render(moderngl.TRIANGLES, vertices=3)
+        self.ctx.depth_func = "<"
+
     def bind(self) -> None:
         """Make the maps readable (texture units 4, 5, 6)."""
         self.first_depth.use(4)
@@ -142,6 +153,7 @@ class LightMaps:
     def release(self) -> None:
         """Give back the memory; the context must be current."""
         for thing in (
-            self.skin_target, self.first_target, self.sums_target, self.skin_depth, self.first_depth, self.sums
+            self.skin_target, self.first_target, self.sums_target, self.skin_depth, self.first_depth, self.sums,
+            self.whole, self.depth_copy,
         ):
             thing.release()

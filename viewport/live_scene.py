@@ -342,11 +342,10 @@ class LiveScene:
             skin = skin_of(looks[item.id]) if item.id in looks else SKIN
             if item.id in feathers:
                 skin = under_feathers(mesh for picture in feathers[item.id] for mesh in picture.quick)
-            wire = options.wire or options.shading == "wire"
             surfaces.append(Surface(
                 posed.points, posed.normals, skin_at_rest(item.mesh, self._evaluator).triangles.vertices,
                 skin, self._map_values(item), "map",
-                item.id in options.ghosted, self._evaluator.get(edge_vertices, item.mesh) if wire else None,
+                item.id in options.ghosted, self._evaluator.get(edge_vertices, item.mesh) if options.edges else None,
                 item.id in looks,
             ))
         pictures = [picture for found in feathers.values() for picture in found]

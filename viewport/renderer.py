@@ -23,7 +23,6 @@ from viewport.scene import Coat, GuideLines, Scene, direction
 from viewport.solids import PLAIN, Solids, lit_uniforms
 
 LARGEST_TILE = 4096  # samples on a side
-MOST_SAMPLES = 6_500_000  # of a tile: memory for many more takes longer to get than a window may stand still
 TILE_STEP = 512  # sizes of tiles are multiples of it, so that another size of a window seldom asks for another one
 MUCH_TOO_LARGE = 5.0  # times; a window paints with one sample and with four in turns
 SAMPLES_AT_ONCE = 1 << 18  # of meshes and of the way to pixels, drawn between two steps
@@ -64,8 +63,9 @@ class Renderer:
     the most, so that a window can stop between any two of them.
     """
 
-    def __init__(self, ctx: moderngl.Context, shadow_side: int = 1024) -> None:
+    def __init__(self, ctx: moderngl.Context, shadow_side: int = 1024, largest_tile: int = LARGEST_TILE) -> None:
         self.ctx = ctx
+        self.largest_tile = largest_tile
         self.solids = Solids(ctx)
         self.strand_programs = StrandPrograms(ctx)
         self.guide_programs = GuidePrograms(ctx)
@@ -150,7 +150,7 @@ class Renderer:
             rows = shown_rows(strands, camera, near_only)
             pieces.append(drawn_points(strands.points, scale))
             orders.append((yield from _told(far_to_near(strands.points, view_row, pieces[-1], rows), 0.1)))
-        tiles = _tiles(size, samples)
+        tiles = _tiles(size, samples, self.largest_tile)
         for number, tile in enumerate(tiles):
             painted = self._paint_tile(prepared, samples, tile, orders, pieces)
             yield from _scaled(painted, 0.1 + 0.9 * number / len(tiles), 0.1 + 0.9 * (number + 1) / len(tiles))
@@ -290,13 +290,10 @@ def light_uniforms(scene: Scene, toward: dict[str, NDArray[np.float64]]) -> dict
     }
 
 
-def _tiles(size: tuple[int, int], samples: int) -> list[tuple[int, int, int, int]]:
-    """Even rectangles x, y, width, height in pixels that cover the picture, with at most MOST_SAMPLES samples each."""
-    width, height = size
-    columns = -(-width * samples // LARGEST_TILE)
-    across = -(-width // columns)
-    rows = -(-height * samples // min(LARGEST_TILE, max(MOST_SAMPLES // (across * samples), 1)))
-    up = -(-height // rows)
+def _tiles(size: tuple[int, int], samples: int, largest: int) -> list[tuple[int, int, int, int]]:
+    """Even rectangles x, y, width, height in pixels that cover the picture, at most `largest` samples a side."""
+    (width, height), most = size, max(largest // samples, 1)
+    across, up = (-(-side // -(-side // most)) for side in size)
     return [
         (x, y, min(across, width - x), min(up, height - y))
         for y in range(0, height, up) for x in range(0, width, across)

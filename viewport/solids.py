@@ -127,7 +127,7 @@ class Solids:
         self._begin(target)
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        if options.wire or options.shading in ("wire", "lines"):
+        if options.edges:
             color = WIRE if options.shading in ("wire", "lines") else WIRE_OVER
             for mesh in self._solid():
                 mesh.draw_edges(color, uniforms)
@@ -139,7 +139,7 @@ class Solids:
         for mesh in self.meshes:
             if mesh.surface.ghost:
                 mesh.draw({**uniforms, "opacity": GHOST_OPACITY, "manner": 1}, quick=quick)
-                if options.wire or options.shading in ("wire", "lines"):
+                if options.edges:
                     mesh.draw_edges(WIRE_GHOST, uniforms)
         target.depth_mask = True
         self._end()

@@ -55,6 +55,7 @@ from viewport.shaders import program, set_uniforms
 SLICE_MS = 14.0  # work is added to a slice until it has taken so long; the last piece may take as long again
 FULL_PART = 0.4  # of the refinement is done when all hairs are shown
 FINISHED_SAMPLES = 2
+WINDOW_TILE = 2048  # samples on a side: memory for more takes longer to get than a window may stand still
 COATED_PIXELS, COATED_OPACITY = 1.0, 0.13  # of plain guides over a coat: seen when looked for
 TEXT_PIXELS = 12.0
 HUD_MARGIN = 14.0
@@ -82,7 +83,7 @@ class View3D:
     ) -> None:
         self.ctx = ctx
         self.tones = tones
-        self.renderer = Renderer(ctx, shadow_side)
+        self.renderer = Renderer(ctx, shadow_side, WINDOW_TILE)
         self.moving = Moving(ctx, self.renderer)
         self.marks = MarkDrawing(ctx)
         self.images = ScreenImages(ctx, text)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import viewport.renderer
 from core.camera import project
 from tests.viewport.scenes import FLAT, ball, camera, hairs
 from viewport.context import collect
@@ -54,15 +53,20 @@ def test_the_same_picture_twice_is_the_same_to_the_bit(ctx):
     assert np.array_equal(render(scene, camera(), W, H, 2, ctx=ctx), render(scene, camera(), W, H, 2, ctx=ctx))
 
 
-def test_tiles_join_without_a_seam(ctx, monkeypatch):
+def test_tiles_join_without_a_seam(ctx):
     skin, coat = ball(look=Look(root_width=0.02, tip_width=0.005))
-    scene = Scene(surfaces=(skin,), coats=(coat,))
-    whole = render(scene, camera(), W, H, 2, ctx=ctx).astype(int)
-    monkeypatch.setattr(viewport.renderer, "LARGEST_TILE", 130)
-    monkeypatch.setattr(viewport.renderer, "MOST_SAMPLES", 130 * 70)
-    tiled = render(scene, camera(), W, H, 2, ctx=ctx).astype(int)
+    scene, target, images = Scene(surfaces=(skin,), coats=(coat,)), ctx.framebuffer([ctx.texture((W, H), 4)]), []
+    for largest in (4096, 130):
+        renderer = Renderer(ctx, largest_tile=largest)
+        renderer.draw(scene, camera(), target, (W, H), 2)
+        assert renderer.tile is not None
+        images.append(np.frombuffer(target.read(components=3), np.uint8).astype(int))
+        renderer.release()
+    whole, tiled = images
+    assert whole.std() > 20
     assert np.abs(whole - tiled).max() <= 12  # a depth test may fall the other way
     assert np.abs(whole - tiled).mean() < 0.02
+    target.release()
 
 
 def test_pictures_of_many_sizes_share_the_memory_they_are_painted_in(ctx):

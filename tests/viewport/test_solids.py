@@ -234,4 +234,4 @@ def test_feathers_are_drawn_a_few_triangles_at_a_time_and_look_the_same(ctx, mon
     renderer.release()
     assert np.ptp(np.frombuffer(images[0], np.uint8)) > 50
     assert images[0] == images[1]
-    assert counts[1] >= counts[0] + 3 * 6  # two maps of shadows and the picture
+    assert counts[1] >= counts[0] + 2 * 6  # the map of shadows and the picture
