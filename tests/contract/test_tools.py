@@ -43,7 +43,10 @@ def test_no_file_was_left_out_and_the_names_are_these():
         "rotate", "move", "ik", "grab", "draw", "inflate", "sculpt_smooth", "relax", "pinch", "flatten", "restore",
         "mask", "weights",
     ]  # fmt: skip
-    assert MATCH == ["track_point", "track_box", "track_plane", "roto", "nudge", "ruler", "track_pattern"]
+    assert MATCH == [
+        "track_point", "track_box", "track_plane", "roto", "nudge", "ruler", "track_pattern", "pick_point", "pick_edge",
+        "pick_circle",
+    ]  # fmt: skip
     assert [*GROOM, *POSE, *MATCH] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)
 

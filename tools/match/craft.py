@@ -16,6 +16,7 @@ from core.groom.region import View
 from core.image.plate import Plate
 from core.image.plate_view import pixels_per_pixel, plate_points, plate_size, view_points
 from core.match.outline import Mask
+from core.match.photomodel.records import Photomodel
 from core.match.track import PlaneTrack, Track
 from tools.craft import Work
 from tools.match_edits import place_at, shown_plate
@@ -23,7 +24,7 @@ from tools.tool import Ground, Pointer, Sight, Tool
 
 Array = NDArray[np.float64]
 REACH = 10.0  # pixels of the view from a track that a press takes hold of it
-FIELDS = ("tracks", "track_selection", "planes", "masks")
+FIELDS = ("tracks", "track_selection", "planes", "masks", "photomodels")
 
 
 class Marks(NamedTuple):
@@ -33,6 +34,7 @@ class Marks(NamedTuple):
     selection: tuple[int, ...]
     planes: tuple[PlaneTrack, ...]
     masks: tuple[Mask, ...]
+    photomodels: tuple[Photomodel, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from core.match.photomodel.records import Photomodel
-from core.match.photomodel.rows import Table
+from core.match.photomodel.rows import Table, ray
 from core.match.solve.constraints import mirror_of
 from core.match.solve.state import Array, Flags, Observations, State, bearings
 
+ROUND = 0.02  # spread of the radius over it: as round as a circle that was solved before still is
+BEST, APART = 8, 0.85  # directions a circle may face that are tried to the end; cosine between any two of them
 NORMALS = 200  # directions a circle may face that are tried
 OUTLINE = 3  # picks of a circle in a photograph from which its middle is told
 
@@ -33,14 +35,37 @@ def placed(state: State, table: Table, model: Photomodel, known: Flags, held: Fl
                 if first[row] >= 0:
                     points[row] = _nearest(points[a], points[b] - points[a], start[first[row]], way[first[row]])
                     held[row] = True
-    for along in table.along_circles:
+    for circle, along in zip(model.circles, table.along_circles, strict=True):
         seen = [row for row in along if first[row] >= 0]
         at = first[seen]
-        plane = _circle(start[at], way[at], observations.frame[at]) if len(seen) >= 2 * OUTLINE else None
+        plane = None
+        if circle.centre is not None and circle.normal is not None:
+            plane = np.array(circle.centre), np.array(circle.normal)
+        if plane is None or _roundness(start[at], way[at], *plane) > ROUND:
+            plane = _circle(start[at], way[at], observations.frame[at]) if len(seen) >= 2 * OUTLINE else None
         if plane is not None:
             points[seen] = _met(start[at], way[at], *plane)
             held[seen] = True
     return state._replace(points=points), held
+
+
+def with_rays(model: Photomodel) -> Photomodel:
+    """The model with a place for every point that has none and is picked in two photographs or more that have one:
+    where the rays of its picks come nearest to each other."""
+    photos = {photo.id: photo for photo in model.photos if photo.rotation is not None}
+    points = []
+    for point in model.points:
+        seen = [(photos[id_], xy) for id_, xy in zip(point.picks.photo.tolist(), point.picks.xy, strict=True)
+                if id_ in photos]
+        if point.place is None and len(seen) > 1:
+            rays = [ray(photo, xy[None]) for photo, xy in seen]
+            across = np.stack([np.eye(3) - np.outer(way[0], way[0]) for _, way in rays])
+            aim = np.einsum("kij,kj->i", across, np.stack([start for start, _ in rays]))
+            place = np.linalg.lstsq(across.sum(axis=0), aim, rcond=None)[0]
+            if all((place - start) @ way[0] > 0.0 for start, way in rays):
+                point = point.replace(place=tuple(map(float, place)))
+        points.append(point)
+    return model.replace(points=tuple(points))
 
 
 def _rays(state: State, observations: Observations) -> tuple[Array, Array]:
@@ -104,10 +129,37 @@ def _circle(start: Array, way: Array, photo: Array) -> tuple[Array, Array] | Non
     height = (np.arange(NORMALS) + 0.5) / NORMALS
     side = np.sqrt(1.0 - height**2)
     normals = np.stack([side * np.cos(golden), side * np.sin(golden), height], axis=1)
-    spread = [_roundness(_met(start, way, middle, normal)) for normal in normals]
-    return middle, normals[int(np.argmin(spread))]
+    spread = [_roundness(start, way, middle, normal) for normal in normals]
+    size = float(np.median(np.linalg.norm(middle - start, axis=1)))
+    tried: list[Array] = []
+    for k in np.argsort(spread):
+        if len(tried) < BEST and all(abs(float(normals[k] @ other)) < APART for other in tried):
+            tried.append(normals[k])
+    found = [_rounder(start, way, middle, normal, size) for normal in tried]
+    return min(found, key=lambda plane: _roundness(start, way, *plane))
 
 
-def _roundness(points: Array) -> float:
-    length = np.linalg.norm(points - points.mean(axis=0), axis=1)
+def _rounder(start: Array, way: Array, middle: Array, normal: Array, size: float) -> tuple[Array, Array]:
+    """Middle and normal moved to where rays meet the plane at one distance from the middle.
+
+    Picks need not be spread evenly, so their own middle is not yet that of the circle.
+    """
+    from scipy.optimize import least_squares
+
+    def plane(by: Array) -> tuple[Array, Array]:
+        turned = normal + by[3:]
+        return middle + size * by[:3], turned / max(float(np.linalg.norm(turned)), 1e-12)
+
+    def off(by: Array) -> Array:
+        there, facing = plane(by)
+        length = np.linalg.norm(_met(start, way, there, facing) - there, axis=1)
+        # the last one holds what says nothing, the length of the normal
+        return np.append(length / max(length.mean(), 1e-12) - 1.0, 1e-3 * float(by[3:] @ normal))
+
+    return plane(np.asarray(least_squares(off, np.zeros(6), max_nfev=40).x))
+
+
+def _roundness(start: Array, way: Array, middle: Array, normal: Array) -> float:
+    """Spread, over their mean, of how far from the middle rays meet a plane."""
+    length = np.linalg.norm(_met(start, way, middle, normal) - middle, axis=1)
     return float(length.std() / max(length.mean(), 1e-12))

@@ -201,7 +201,10 @@ class Part(Record):
 
 
 class Photomodel(Record):
-    """Photographs, what was picked in them and what is built; ids are unique among their kind."""
+    """Photographs, what was picked in them and what is built; ids are unique among their kind.
+
+    selection : ids of the points in hand, the active one last; ids of points that are gone mean nothing.
+    """
 
     id: int
     name: str
@@ -214,10 +217,11 @@ class Photomodel(Record):
     parts: tuple[Part, ...] = ()
     hidden: bool = False
     locked: bool = False
+    selection: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         text(self, "name")
-        number(self, "id", least=0, most=MOST_ID)
+        number(self, "id", "selection", least=0, most=MOST_ID)
         for kind in ("photos", "points", "lines", "circles", "parts"):
             items = getattr(self, kind)
             if len({item.id for item in items}) != len(items):

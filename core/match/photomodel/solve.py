@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from core.errors import UserError
-from core.match.photomodel.begin import placed
-from core.match.photomodel.records import Photomodel
+from core.match.photomodel.begin import placed, with_rays
+from core.match.photomodel.records import NOTHING, Photomodel
 from core.match.photomodel.rows import Table, constraints_of, table_of
 from core.match.solve.bundle import POSE, Free, adjust
 from core.match.solve.constraints import HARD, Constraint, Pull, circle_of
@@ -59,12 +59,14 @@ def solved(model: Photomodel, *, again: bool = False) -> Outcome:
     """
     table = table_of(model)
     focal = guessed(table.views.cameras[0]) if model.photos else 1.0
-    warm = not again and _is_solved(model, table)
+    warm = not again and is_solved(model)
     if warm:
         table, pixel, state, known, held = _from_records(model, table, focal)
         hardness: tuple[float, ...] = (HARD,)
     else:
         table, pixel, state, known, held = _from_picks(model, table)
+        circles = tuple(circle.replace(centre=None, normal=None, radius=None) for circle in model.circles)
+        model = model.replace(circles=circles)  # of another world than the one that begins here
         hardness = (*LOOSE, HARD)
     state, held = placed(state, table, model, known, held)
     constraints = constraints_of(model, table, held)
@@ -76,9 +78,28 @@ def solved(model: Photomodel, *, again: bool = False) -> Outcome:
     return _outcome(model, state, table, pixel, known, held, constraints, said)
 
 
-def _is_solved(model: Photomodel, table: Table) -> bool:
-    return len(model.photos) > 1 and all(photo.rotation is not None for photo in model.photos) and all(
-        point.place is not None for point in model.points if len(point.picks.photo) > 1)
+def is_solved(model: Photomodel) -> bool:
+    """True when a model only needs to be adjusted: two photographs have a place, every point that they see twice has
+    one, and no other photograph holds enough of these points to get one too."""
+    there = {photo.id for photo in model.photos if photo.rotation is not None}
+    lacking = [photo.id for photo in model.photos if photo.rotation is None]
+    seen = np.concatenate([point.picks.photo for point in model.points if point.place is not None] or [NOTHING.photo])
+    return len(there) > 1 and all((seen == id_).sum() < FEWEST for id_ in lacking) and all(
+        point.place is not None for point in model.points if len(there & set(point.picks.photo.tolist())) > 1)
+
+
+def live(model: Photomodel) -> Photomodel:
+    """The model under a hand: solved again where only little has changed, left as it is where that cannot be.
+
+    Points that were just picked a second time get their first place from their rays.
+    """
+    ready = with_rays(model)
+    if not is_solved(ready):
+        return model
+    try:
+        return solved(ready).model
+    except UserError:
+        return model
 
 
 Begun = tuple[Table, Array, State, Flags, Flags]
@@ -92,11 +113,13 @@ def _from_records(model: Photomodel, table: Table, focal: float) -> Begun:
         if point.place is not None:
             points[row], held[row] = point.place, True
     lens = start_lens(focal, *table.views.cameras[0].size)
+    known = np.array([photo.rotation is not None for photo in model.photos])
     state = State(
-        np.array([photo.rotation for photo in model.photos]), np.array([photo.translation for photo in model.photos]),
+        np.array([np.eye(3) if photo.rotation is None else photo.rotation for photo in model.photos]),
+        np.array([photo.translation or (0.0, 0.0, 0.0) for photo in model.photos]),
         points, np.zeros(len(model.photos)), lens,
     )
-    return table._replace(observations=observations), pixel, state, np.ones(len(model.photos), bool), held
+    return table._replace(observations=observations), pixel, state, known, held
 
 
 def _from_picks(model: Photomodel, table: Table) -> Begun:
