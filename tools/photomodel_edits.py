@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from core.document import Document, free_id
+from core.document import Document, free_id, with_mesh
 from core.errors import UserError
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
@@ -21,6 +21,7 @@ from core.match.photomodel.records import (
     Picked,
     WorldFrame,
 )
+from tools.document_edits import add_mesh
 
 MOST = 64  # photographs that are taken into a new model by themselves
 NO_MODEL = "There is no model of photographs yet; pick a point first."
@@ -132,6 +133,32 @@ def points_in_hand(model: Photomodel) -> tuple[int, ...]:
 def select_points(document: Document, ids: tuple[int, ...]) -> Document:
     """The document with just these points of the model in hand, the last one active."""
     return put_model(document, _model(document).replace(selection=tuple(dict.fromkeys(ids))))
+
+
+def select_next_point(document: Document, plate_id: int, frame: int) -> Document:
+    """The document with the next point in hand that is not picked in a photograph, the first after the last."""
+    model = _model(document)
+    photo = photo_of(model, plate_id, frame)
+    here = -1 if photo is None else photo.id
+    active = active_point(model)
+    first = 0 if active is None else active + 1
+    for point in (*model.points[first:], *model.points[:first]):
+        if here not in point.picks.photo:
+            return put_model(document, model.replace(selection=(point.id,)))
+    raise UserError("Every point is picked in this photograph; go on to the next one.")
+
+
+def model_to_scene(document: Document) -> Document:
+    """The document with what is built as a mesh of the scene, in place of the mesh of the model's name without coat."""
+    from core.match.photomodel.build import built
+
+    model = _model(document)
+    mesh = built(model)
+    grown = {groom.mesh_id for groom in document.grooms}
+    for item in document.meshes:
+        if item.name == model.name and item.rig is None and item.id not in grown and not item.locked:
+            return with_mesh(document, item.replace(mesh=mesh, mask=None, surface=None))
+    return add_mesh(document, mesh, model.name)
 
 
 def add_known(document: Document, kind: str, value: tuple[float, ...] = ()) -> Document:

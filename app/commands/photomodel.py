@@ -5,28 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import cv2
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
+from app.photomodel_file import write_model
 from app.report import Report, peak_megabytes
 from core.document import Document, free_id
 from core.errors import UserError
-from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
-from core.formats.mesh_file import write_mesh
-from core.formats.obj_material import add_material
 from core.formats.picks_json import photographs_of, read_picks
 from core.formats.plate_file import read_plate
 from core.formats.project import Project, read_project, write_project
-from core.image.mix import to_float
 from core.image.plate import Plate, frame_name
-from core.match.photomodel.build import built
 from core.match.photomodel.records import Photomodel
 from core.match.photomodel.solve import Outcome, solved
-from core.match.photomodel.texture import textured
-from core.mesh.mesh import Mesh
 from core.workspace import Workspace
 
 
@@ -65,7 +57,7 @@ def command(
                 outputs.append(str(project))
             if output is not None:
                 with telling.stage("build", "building the model"):
-                    outputs += _written(output, item, document, project, texture, decoder)
+                    outputs += write_model(output, item, document.plates, project.parent, texture, decoder)
     finally:
         decoder.close()
     warnings = outcome.warnings if outcome else ()
@@ -131,38 +123,6 @@ def _chosen(document: Document, name: str | None) -> Photomodel:
         names = ", ".join(one.name for one in document.photomodels)
         raise UserError(f"There is no model {name!r} in this project; there are {names}.")
     return found[0]
-
-
-def _written(
-    output: Path, item: Photomodel, document: Document, project: Path, texture: int, decoder: FrameDecoder
-) -> list[str]:
-    mesh: Mesh = built(item)
-    written = [str(output)]
-    if texture:
-        pictures = [_picture(document, photo.plate_id, photo.frame, photo.name, project, decoder) for photo in item.photos]
-        done = textured(mesh, item.photos, pictures, texture)
-        mesh = done.mesh
-        image = output.with_suffix(".png")
-        with atomic_write(image) as beside:
-            coded = cv2.imencode(".png", np.rint(np.clip(done.picture[:, :, ::-1], 0, 1) * 255).astype(np.uint8))[1]
-            beside.write_bytes(coded.tobytes())
-        written.append(str(image))
-    write_mesh(output, mesh)
-    if texture and output.suffix.lower() == ".obj":
-        written.append(str(add_material(output, output.with_suffix(".png").name)))
-    return written
-
-
-def _picture(
-    document: Document, plate_id: int, frame: int, name: str, project: Path, decoder: FrameDecoder
-) -> NDArray[np.float32]:
-    plate = next((one for one in document.plates if one.id == plate_id), None)
-    if plate is None:
-        raise UserError(f"The photograph {name} names no file, so it cannot be projected.")
-    pixels = to_float(decoder.decode(project.parent / frame_name(plate.path, frame))[0])
-    if pixels.ndim == 2:
-        pixels = pixels[:, :, None]
-    return np.ascontiguousarray(np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[:, :, :3])
 
 
 def _result(item: Photomodel, outcome: Outcome | None, outputs: list[str], telling: Report) -> dict[str, Any]:

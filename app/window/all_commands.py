@@ -6,6 +6,7 @@ from app.window.commands import Command
 from app.window.feather_coats import FEATHER_COATS
 from app.window.files.file_commands import EDIT, FILE, MACRO
 from app.window.match.commands import MATCH, PLATE_FILES
+from app.window.match.model_commands import MODEL, MODEL_FILES
 from app.window.plugin_bar import trouble_commands
 from app.window.pose.look import POSE_LOOK
 from app.window.scene_commands import SCENE
@@ -19,6 +20,6 @@ from tools.registry import Registry
 def all_commands(registry: Registry) -> tuple[Command, ...]:
     """Every command there is, in the order of the menus; those of the tools come from `registry`."""
     return (
-        *FILE, *PLATE_FILES, *EDIT, *SCENE, *FEATHER_COATS, *VIEW, *POSE_LOOK, *FRAME, *CURVES,
-        *tool_commands(registry), *HAND, *ACTION_COMMANDS, *MATCH, *MACRO, *WINDOW, *trouble_commands(registry),
+        *FILE, *PLATE_FILES, *MODEL_FILES, *EDIT, *SCENE, *FEATHER_COATS, *VIEW, *POSE_LOOK, *FRAME, *CURVES,
+        *tool_commands(registry), *HAND, *ACTION_COMMANDS, *MATCH, *MODEL, *MACRO, *WINDOW, *trouble_commands(registry),
     )

@@ -35,8 +35,10 @@ PARTS: dict[str, tuple[Part, ...]] = {
         Part("clear_mask", "Mask")),
     "match": (
         Part("forward"), Part("features"), Part("solve"), Part("cube", "Solved camera"), Part("delete_shapes"),
-        Part("key", "Keys of tracks"), Part("delete"), Part("select_all"), Part("next_key"),
-        Part("nudge_left", "Nudge"), Part("next_plate")),
+        Part("key", "Keys of tracks"), Part("delete", "Selected tracks"), Part("select_all"), Part("next_key"),
+        Part("nudge_left", "Nudge"), Part("next_plate"),
+        Part("take_photographs", "Model of photographs"), Part("build_polygon", "Build on points"),
+        Part("know_distance", "Known of points"), Part("model_origin", "World of the model")),
     "window": (
         Part("craft_groom"), Part("shelf", "Panels"), Part("palette"), Part("theme"), Part("preferences"),
         Part("reset_layout")),

@@ -27,7 +27,7 @@ class PickCircle(Tool[CirclePickParams]):
     icon = "loop"
     order = 219
     tooltip = "Picks along the outline of something round: three clicks or more in each of two photographs or more."
-    hint = "Click: pick along the outline of the last circle   Shift: begin a new circle   Drag: move a pick"
+    hint = "Click: pick along the last circle   Shift: a new circle   Drag: move a pick   Ctrl: a tenth as far"
     step = "Pick circle"
     craft = "match"
     edits = "marks"

@@ -56,7 +56,7 @@ class PickPoint(Tool[PointPickParams]):
     icon = "plant"
     order = 217
     tooltip = "Picks a corner in photographs of one thing; a point in hand is picked in the next photograph too."
-    hint = "Click: pick the point in hand here, or a new one   Drag: move a pick   Shift: add   Alt-N: next photograph"
+    hint = "Click: pick the point in hand, or a new one   Drag: move a pick   Shift: add   Ctrl: a tenth as far"
     step = "Pick point"
     craft = "match"
     edits = "marks"

@@ -14,6 +14,8 @@ from app.window.desk import Desk
 from app.window.match.doors import MatchDoors
 from app.window.match.eye import PlateEye
 from app.window.match.marks import Sheet, errors_of, marks_of
+from app.window.match.model_job import ModelJob
+from app.window.match.model_marks import model_marks
 from app.window.match.pattern import patches
 from app.window.match.screen import PlateScreen, Shown
 from app.window.match.solve_job import SolveJob
@@ -45,6 +47,7 @@ class PlateView(QObject):
         self.screen = PlateScreen(desk)
         self.tracking = MatchTracking(desk)
         self.solving = SolveJob(desk)
+        self.model = ModelJob(desk, window)
         self.doors = MatchDoors(desk, window)
         self.screen.fresh.connect(self.fresh)
         self.tracking.made.connect(self.fresh)
@@ -74,7 +77,7 @@ class PlateView(QObject):
         frame, camera = self.eye.frame, self.eye.camera
         shown = self.screen.picture(plate, frame)
         sheet = Sheet(plate, frame, camera, size, ratio)
-        marks = marks_of(self.desk.document, sheet) + self._live(sheet)
+        marks = marks_of(self.desk.document, sheet) + self._live(sheet) + model_marks(self.desk.document, sheet)
         solved = solved_of(self.desk.document, plate.id)
         if solved is not None:
             marks += solve_marks(solved, sheet)
