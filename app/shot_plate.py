@@ -48,7 +48,7 @@ def draw_plate(folder: Path, model: Figure, truth: list[Moment]) -> list[NDArray
             marks = [(points[v].astype(np.float64), MARK) for part in (model.head, model.neck, model.body)
                      for v in part.vertices.values()]
             marks += [(place, ROOM_MARK) for place in room_marks().values()]
-            surfaces += [_marks(marks), *_room()]
+            surfaces += [balls(marks), *_room()]
             lights = Lights(follow_camera=False)
             scene = Scene(tuple(surfaces), lights=lights, background=((0.02, 0.02, 0.03), (0.01, 0.01, 0.01)),
                           exposure=EXPOSURE)
@@ -59,7 +59,7 @@ def draw_plate(folder: Path, model: Figure, truth: list[Moment]) -> list[NDArray
     return pictures
 
 
-def _marks(marks: list[tuple[NDArray[np.float64], float]]) -> Surface:
+def balls(marks: list[tuple[NDArray[np.float64], float]]) -> Surface:
     """Bright balls in one surface."""
     unit, quads = ball()
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
@@ -76,7 +76,7 @@ def _room() -> list[Surface]:
     ahead = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
     found = [Surface(wall, ahead, np.array([[0, 1, 2], [0, 2, 3]], np.int32), (0.10, 0.105, 0.12))]
     for row, box in enumerate(BOXES):
-        points, rows = _box(*box)
+        points, rows = box_faces(*box)
         across = np.cross(points[1::4] - points[::4], points[2::4] - points[::4])
         normals = np.repeat(across / np.linalg.norm(across, axis=1, keepdims=True), 4, axis=0).astype(np.float32)
         share = 0.6 + 0.7 * float(rand(row, 5))
@@ -84,7 +84,7 @@ def _room() -> list[Surface]:
     return found
 
 
-def _box(low: tuple[float, ...], high: tuple[float, ...]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def box_faces(low: tuple[float, ...], high: tuple[float, ...]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Points of the six sides of a box, four each, and its triangles."""
     unit = np.array([[a, b, c] for c in (0, 1) for b in (0, 1) for a in (0, 1)], np.float64)
     faces = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -124,7 +124,7 @@ def seen_marks(model: Figure, moment: Moment) -> dict[str, NDArray[np.float64]]:
         facing = np.concatenate([facing, cosine])
     triangles, corners = [triangulate(model.mesh).vertices], [points]
     for box in BOXES:
-        more, rows_of_box = _box(*box)
+        more, rows_of_box = box_faces(*box)
         triangles.append(rows_of_box + sum(map(len, corners)))
         corners.append(more)
     tree = build_bvh(np.concatenate(corners), np.concatenate(triangles).astype(np.int32))

@@ -36,6 +36,7 @@ CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's mesh
 # the chapter made of its steps stands between
 FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"
 FIRST_TRACK = "<!-- first track -->\n", "\n<!-- end of first track -->"
+FIRST_SOLVE = "<!-- first solve -->\n", "\n<!-- end of first solve -->"
 STYLES = ("short", "fur", "long", "mane")
 
 
@@ -77,6 +78,15 @@ def first_track() -> None:
 
     pictures_of_steps(STEPS, SIZE, picture_of)
     _put_chapter("match.md", FIRST_TRACK, chapter())
+
+
+def first_solve() -> None:
+    """Follow the first solve by hand; a picture of the window after every step."""
+    ensure_display()  # before anything of Qt is made
+    from docs.first_solve import SIZE, STEPS, chapter, picture_of
+
+    pictures_of_steps(STEPS, SIZE, picture_of)
+    _put_chapter("match.md", FIRST_SOLVE, chapter())
 
 
 def _put_chapter(page: str, marks: tuple[str, str], chapter: str) -> None:
@@ -158,6 +168,7 @@ def main() -> None:
     feathers()
     first_groom()
     first_pose()
+    first_solve()
     shot()
     evaluator = Evaluator()
     document = demo_document(evaluator)

@@ -56,7 +56,7 @@ def solved_camera(
     advice = [
         Advice(words=_fix_words(fix.kind, told.rms_px, fix.rms_px, names, frames, fix.row),
                track_id=tracks[fix.row].id if fix.kind == "track" else 0,
-               frame=int(frames[fix.row]) if fix.kind == "frame" else None)
+               frame=int(frames[fix.row]) if fix.kind == "frame" else None, without=fix.rms_px)
         for fix in helpful(told.fixes, told.by_frame, told.by_track)
     ]
     seen = np.bincount(observations.track, minlength=len(tracks))
@@ -72,6 +72,7 @@ def solved_camera(
         errors=frozen(np.nan_to_num(told.by_track[held])), by_frame=frozen(np.nan_to_num(told.by_frame[known])),
         rms=told.rms_px, median=told.median_px, p95=told.p95_px, focal_sigma=told.focal_sigma_px,
         warnings=told.warnings, advice=tuple(advice), settings=settings,
+        spread=frozen(np.nan_to_num(told.point_sigma[held])),
     )
 
 

@@ -40,6 +40,7 @@ from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
 from app.window.match.plate_panel import PlatePanel
 from app.window.match.solve_panel import SolvePanel
+from app.window.match.solve_space import SolveSpace
 from app.window.match.track_list import TrackList
 from app.window.match.view import PlateView
 from app.window.memory import give_back_freed_memory
@@ -74,7 +75,7 @@ from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
-AROUND = ("shelf", "timeline", "curves", "pose_map", "feather")  # panels that are not in the column
+AROUND = ("shelf", "timeline", "curves", "pose_map", "feather", "space")  # panels that are not in the column
 COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
 
 
@@ -117,9 +118,11 @@ class MainWindow(QMainWindow):
         self.curves = CurvePanel(self.desk, self.commands, self.hotkeys)
         self.pose_side = PoseSide(self.desk)
         self.feather_side = FeatherSide(self.desk, self.viewport.draw_beside, FoldMemory(self._folder))
+        self.solve_space = SolveSpace(
+            self.desk, lambda: self.hotkeys.keymap, lambda: self.viewport.eye.trackball, self.match.screen)
         self.panels: dict[str, QWidget] = {
             "shelf": self.shelf, "timeline": self.timeline, "curves": self.curves, "pose_map": self.pose_side,
-            "feather": self.feather_side}
+            "feather": self.feather_side, "space": self.solve_space}
         self.column = self._make_column()
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
@@ -146,6 +149,8 @@ class MainWindow(QMainWindow):
     def _make_column(self) -> Column:
         memory, column = FoldMemory(self._folder), Column()
         self.outliner = Outliner(self.desk, reload=lambda mesh_id, ask: self.files.reload_mesh(None, mesh_id, ask))
+        self.solve_panel = SolvePanel(self.desk, self.match.solving)
+        self.solve_panel.space.clicked.connect(lambda checked=False: self.commands.run("window.space"))
         made: tuple[tuple[str, QWidget], ...] = (
             ("scene", Section(PANELS["scene"][0], self.outliner, memory, "scene")),
             ("tool", ToolPanel(self.desk, memory)),
@@ -155,7 +160,7 @@ class MainWindow(QMainWindow):
             ("rig", Section(PANELS["rig"][0], RigPanel(self.desk), memory, "rig")),
             ("respect", RespectPanel(self.desk, memory)),
             ("tracks", Section(PANELS["tracks"][0], TrackList(self.desk), memory, "tracks")),
-            ("solve", Section(PANELS["solve"][0], SolvePanel(self.desk, self.match.solving), memory, "solve")),
+            ("solve", Section(PANELS["solve"][0], self.solve_panel, memory, "solve")),
             ("plate", Section(PANELS["plate"][0], PlatePanel(self.desk, memory), memory, "plate")),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),
@@ -169,7 +174,7 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
-        self.sides = BesideView(BesideView(self.view, self.pose_side), self.feather_side)
+        self.sides = BesideView(BesideView(BesideView(self.view, self.pose_side), self.feather_side), self.solve_space)
         self.middle.addWidget(self.sides)
         self.middle.addWidget(self.doors)
         self.split.addWidget(self.middle)

@@ -26,6 +26,7 @@ PANELS = {
     "plate": ("Plates", "Shows or hides the list of plates, with film, crop, colours and what tracking sees."),
     "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
     "solve": ("Solve", "Shows or hides the solved camera: how good it is, what may be wrong, what to mend."),
+    "space": ("Solved scene", "Shows or hides the solved camera in space beside the plate, with its path and points."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
     "history": ("History", "Shows or hides the list of steps that undo goes through."),
@@ -36,9 +37,10 @@ PANELS = {
 PANEL_CRAFTS = {
     "coat": "groom", "maps": "groom", "feather": "groom", "controls": "pose", "poses": "pose", "library": "pose",
     "rig": "pose", "pose_map": "pose", "tracks": "match", "solve": "match", "plate": "match",
+    "space": "match",
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
-AT_FIRST_HIDDEN = ("curves", "feather")
+AT_FIRST_HIDDEN = ("curves", "feather", "space")
 PUT_AWAY = "-"  # before the name of a panel in Workspace.panels that was hidden by hand
 TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels
 _SETTINGS = "app.window.settings.save_settings"

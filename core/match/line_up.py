@@ -73,5 +73,6 @@ def _moved(solved: SolvedCamera, scale: float, turn: np.ndarray, shift: np.ndarr
     rotation = solved.rotation @ turn.T
     moved: SolvedCamera = solved.replace(
         rotation=frozen(rotation), translation=frozen(scale * solved.translation - rotation @ shift),
-        points=frozen(scale * solved.points @ turn.T + shift))
+        points=frozen(scale * solved.points @ turn.T + shift),
+        spread=frozen(scale**2 * turn @ solved.spread @ turn.T))
     return moved

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 LENSES = ("none", "brown", "fisheye", "radial4", "anamorphic4")
 LEAST_COLUMNS, MOST_COLUMNS = 6, 18  # of a lens
 LONGEST = 2000  # letters of a warning
+UNASKED = freeze(np.zeros((0, 3, 3)))
 
 
 class SolveSettings(Record):
@@ -47,15 +48,20 @@ class SolveSettings(Record):
 
 
 class Advice(Record):
-    """What to mend next. track_id : the track it is of, 0 for none; frame : where to look, None for nowhere."""
+    """What to mend next. track_id : the track it is of, 0 for none; frame : where to look, None for nowhere.
+
+    without : RMS in pixels that is foretold of the rest without it, 0 where that was not asked.
+    """
 
     words: str
     track_id: int = 0
     frame: int | None = None
+    without: float = 0.0
 
     def __post_init__(self) -> None:
         text(self, "words", longest=LONGEST)
         number(self, "track_id", least=0, most=2**31 - 1)
+        number(self, "without", least=0.0, most=1e9)
 
 
 class LineUp(Record):
@@ -94,6 +100,7 @@ class SolvedCamera(Record):
     size : pixels of the plate. lens (L,), frames (F,) int32 rising, rotation (F, 3, 3), translation (F, 3), focal (F,),
     points (P, 3) : those of a `Shot`. track_ids (P,) int32. errors (P,) and by_frame (F,) : RMS in pixels.
     kind : free, planar or nodal. cubes : ids of tracks a test cube stands at. line_up : what holds the world.
+    spread (P, 3, 3) : covariance of the points in their world, zero where there is none; (0, 3, 3) was not asked.
     """
 
     id: int
@@ -118,6 +125,7 @@ class SolvedCamera(Record):
     cubes: tuple[int, ...] = ()
     settings: SolveSettings = SolveSettings()
     line_up: LineUp = LineUp()
+    spread: np.ndarray = UNASKED
 
     def __post_init__(self) -> None:
         number(self, "id", "plate_id", least=0, most=2**31 - 1)
@@ -143,6 +151,7 @@ class SolvedCamera(Record):
         column(self, "points", np.float64, (None, 3))
         column(self, "track_ids", np.int32, (len(self.points),))
         column(self, "errors", np.float64, (len(self.points),))
+        column(self, "spread", np.float64, (len(self.points) if len(self.spread) else 0, 3, 3))
 
 
 def shot_of_record(solved: SolvedCamera, names: dict[int, str] | None = None) -> Shot:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.window.desk import Desk
@@ -31,6 +33,7 @@ class SolveJob(QObject):
         self._stale.setSingleShot(True)
         self._stale.setInterval(PATIENCE)
         self._stale.timeout.connect(self._solve_again)
+        desk.jobs.changed.connect(self._let_go)
         desk.changed.connect(self._document_changed)
         desk.session_replaced.connect(self._session_replaced)
 
@@ -45,7 +48,11 @@ class SolveJob(QObject):
         self.changed.emit()
 
     def solve(self) -> None:
-        """Solve the plate in view from its tracks that are not hidden.
+        """Solve the plate in view from its tracks that are not hidden; what goes wrong is said as an error."""
+        self._start(self.desk.error)
+
+    def _start(self, refused: Callable[[Exception], None]) -> None:
+        """Begin a solve.
 
         Raises
         ------
@@ -72,6 +79,8 @@ class SolveJob(QObject):
             return solved_camera(plate, tracks, settings, words)
 
         def done(found: SolvedCamera) -> None:
+            if self.job is not job:
+                return  # it was cancelled at its last step
             self.job = None
             if any(p.id == plate.id for p in self.desk.document.plates) and self.desk.edit(STEP, put_solve, found):
                 self.desk.said.emit(
@@ -80,29 +89,47 @@ class SolveJob(QObject):
             self.changed.emit()
 
         def failed(error: Exception) -> None:
+            if self.job is not job:
+                return
             self.job = None
             self.changed.emit()
-            if isinstance(error, Cancelled):
-                self.desk.said.emit("The solve was cancelled; the camera is as before.")
-            else:
-                self.desk.error(error)
+            refused(error)
 
-        self.job = self.desk.jobs.start(STEP, work, done, failed, self)
+        self.job = job = self.desk.jobs.start(STEP, work, done, failed, self)
         self.changed.emit()
+
+    def _let_go(self) -> None:
+        """A solve that was told to stop is over at once for the hand; its thread ends at its next step."""
+        if self.job is not None and self.job.stopping:
+            self.job = None
+            if not self._stale.isActive():
+                self.desk.said.emit("The solve was cancelled; the camera is as before.")
+            self.changed.emit()
 
     def _document_changed(self, old: Document, new: Document) -> None:
         plate = shown_plate(new)
         if plate is None or not self.settings.again or solved_of(new, plate.id) is None:
             return
+        if self.desk.session.history.redo_name is not None:
+            return  # an undo: another step now would take its redo away
         before, now = tracks_to_solve(old, plate.id), tracks_to_solve(new, plate.id)
         if len(before) != len(now) or any(a is not b for a, b in zip(before, now, strict=True)):
             self._stale.start()
+            if self.job is not None:  # it solves what is no more
+                self.desk.jobs.cancel(self.job)
 
     def _solve_again(self) -> None:
-        if self.running or self.desk.session.stroking:
+        if self.desk.session.stroking:
             self._stale.start()
+        elif not self.running:
+            self.desk.attempt(self._start, self._say)
+
+    def _say(self, error: Exception) -> None:
+        """In the background a refusal is no error: the hand is in the middle of mending."""
+        if isinstance(error, UserError):
+            self.desk.said.emit(f"The camera stays as it was: {error}")
         else:
-            self.desk.attempt(self.solve)
+            self.desk.error(error)
 
     def _session_replaced(self) -> None:
         self._stale.stop()

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from app.window.match.marks import Sheet
 from core.match.solved import SolvedCamera, cube_edges, pixels_of, world_axes
+from core.match.solved_scene import grades, ground_lines
 from core.overlay import Overlay, Overlays, Polyline, Tone
 
 CROSS = 5.0  # half of a cross, pixels of the screen
-FAR_OFF = 2.5  # of the median error
 
 
 def solve_marks(solved: SolvedCamera, sheet: Sheet) -> Overlays:
@@ -19,15 +19,17 @@ def solve_marks(solved: SolvedCamera, sheet: Sheet) -> Overlays:
     if xy is None:
         return ()
     out: list[Overlay] = []
-    typical = float(np.median(solved.errors)) if len(solved.errors) else 0.0
     half = CROSS * sheet.ratio
-    for place, error in zip(xy, solved.errors, strict=True):
+    tones: tuple[Tone, ...] = ("good", "accent", "trouble")
+    for place, grade in zip(xy, grades(solved.errors).tolist(), strict=True):
         if np.isfinite(place).all():
             x, y = sheet.at(place[None])[0]
-            tone: Tone = "good" if error <= 1.5 * typical else "accent" if error <= FAR_OFF * typical else "trouble"
+            tone = tones[grade]
             out += [Polyline(np.array([[x - half, y], [x + half, y]]), tone, 1.0),
                     Polyline(np.array([[x, y - half], [x, y + half]]), tone, 1.0)]
     if solved.line_up.said:
+        for line in ground_lines(solved):
+            out += _line(solved, sheet, line, "faint", 1.0)
         axes: tuple[Tone, ...] = ("x", "y", "z")
         for tone, axis in zip(axes, world_axes(solved), strict=True):
             out += _line(solved, sheet, axis, tone)
@@ -39,9 +41,11 @@ def solve_marks(solved: SolvedCamera, sheet: Sheet) -> Overlays:
     return tuple(out)
 
 
-def _line(solved: SolvedCamera, sheet: Sheet, points: NDArray[np.float64], tone: Tone) -> list[Overlay]:
-    """A line through points of the world, where all of them are before the camera."""
+def _line(
+    solved: SolvedCamera, sheet: Sheet, points: NDArray[np.float64], tone: Tone, width: float = 2.0
+) -> list[Overlay]:
+    """A line through points of the world, bent by the lens, where all of them are before the camera."""
     line = pixels_of(solved, sheet.frame, points)
     if line is None or not np.isfinite(line).all():
         return []
-    return [Polyline(sheet.at(line), tone, 2.0)]
+    return [Polyline(sheet.at(line), tone, width)]

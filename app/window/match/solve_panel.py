@@ -11,8 +11,10 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QListWidget, QListWidgetItem,
 from app.window.desk import Desk
 from app.window.match.error_curve import ErrorCurve
 from app.window.match.solve_job import SolveJob
+from app.window.match.solve_table import SolveTable, Worst, worst_of
 from app.window.params_panel import RecordForm, Setting
 from core.match.solved import Advice, SolvedCamera
+from core.match.solved_scene import misses
 from tools.match_edits import select_tracks, set_tracks, shown_plate
 from tools.solve_edits import solved_of
 
@@ -37,13 +39,18 @@ class SolvePanel(QWidget):
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.curve = ErrorCurve()
         self.curve.chosen.connect(self._go_to)
+        self.table = SolveTable()
+        self.table.chosen.connect(self.follow)
+        self.table.itemSelectionChanged.connect(self._choose_row)
+        self.space = QPushButton("In space")
+        self.space.setToolTip("Shows or hides path, points and camera in space beside the plate.")
         self.advice = QListWidget()
         self.advice.setToolTip("What to mend next, the most helpful first. A click goes to the frame or the track.")
         self.advice.setWordWrap(True)
         self.advice.itemClicked.connect(lambda entry: self.follow(entry.data(_ROLE)))
-        self.advice.itemSelectionChanged.connect(self._enable)
+        self.advice.itemSelectionChanged.connect(self._choose_advice)
         self.without = QPushButton("Leave out and solve")
-        self.without.setToolTip("Hides the track of the chosen advice and solves again without it.")
+        self.without.setToolTip("Hides the track of the chosen row or advice and solves again without it.")
         self.without.clicked.connect(lambda checked=False: desk.attempt(self._leave_out))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -51,10 +58,10 @@ class SolvePanel(QWidget):
         line = QHBoxLayout()
         line.setSpacing(4)
         line.addWidget(self.start)
-        line.addWidget(self.without)
+        line.addWidget(self.space)
         column.addWidget(self.form)
         column.addLayout(line)
-        for widget in (self.figures, self.curve, self.warnings, self.advice):
+        for widget in (self.figures, self.curve, self.warnings, self.table, self.advice, self.without):
             column.addWidget(widget)
         self._seen: tuple[object, ...] = ()
         desk.changed.connect(lambda old, new: self.refresh())
@@ -87,8 +94,11 @@ class SolvePanel(QWidget):
         self.warnings.setVisible(solved is not None and bool(solved.warnings))
         self.advice.clear()
         self.advice.setVisible(solved is not None and bool(solved.advice))
-        self.without.setVisible(self.advice.isVisibleTo(self))
+        self.without.setVisible(solved is not None)
+        self.space.setEnabled(solved is not None)
+        self.table.setVisible(solved is not None)
         if solved is not None:
+            self.table.show_rows(worst_of(solved, self.desk.document))
             self.figures.setText(figures_of(solved))
             self.warnings.setText("\n".join(solved.warnings))
             for one in solved.advice:
@@ -99,7 +109,7 @@ class SolvePanel(QWidget):
             self.advice.setFixedHeight(2 * self.advice.frameWidth() + rows * 2 * self.advice.fontMetrics().height() + 6)
         self._enable()
 
-    def follow(self, advice: Advice) -> None:
+    def follow(self, advice: Advice | Worst) -> None:
         """Go to the frame of an advice, or select its track and go to where the solve misses it most."""
         plate, solved = shown_plate(self.desk.document), self.solved
         if plate is None or solved is None:
@@ -109,7 +119,9 @@ class SolvePanel(QWidget):
             self.desk.edit("Select tracks", select_tracks, (advice.track_id,))
             track = next((t for t in self.desk.document.tracks if t.id == advice.track_id), None)
             if track is not None and len(track.frames):
-                frame = int(track.frames[len(track.frames) // 2])
+                frames, off = misses(solved, track)
+                frame = int(frames[np.nanargmax(off)] if np.isfinite(off).any()
+                            else track.frames[len(track.frames) // 2])
         if frame is not None:
             self._go_to(frame)
 
@@ -123,15 +135,31 @@ class SolvePanel(QWidget):
         if plate is not None:
             self.desk.set_workspace(frame=float(frame + plate.offset))
 
-    def _leave_out(self) -> None:
+    @property
+    def _chosen(self) -> int:
+        """Id of the track that is chosen in the table or in the advice; 0 for none."""
         chosen = self.advice.selectedItems()
-        track = chosen[0].data(_ROLE).track_id if chosen else 0
+        advice: Advice | None = chosen[0].data(_ROLE) if chosen else None
+        one = self.table.row or advice
+        return 0 if one is None else one.track_id
+
+    def _choose_row(self) -> None:
+        if self.table.row is not None:
+            self.advice.clearSelection()
+        self._enable()
+
+    def _choose_advice(self) -> None:
+        if self.advice.selectedItems():
+            self.table.clearSelection()
+        self._enable()
+
+    def _leave_out(self) -> None:
+        track = self._chosen
         if track and self.desk.edit("Hide tracks", set_tracks, (track,), hidden=True):
             self.job.solve()
 
     def _enable(self) -> None:
-        chosen = self.advice.selectedItems()
-        self.without.setEnabled(bool(chosen) and bool(chosen[0].data(_ROLE).track_id) and not self.job.running)
+        self.without.setEnabled(bool(self._chosen) and not self.job.running)
 
     def _edited(self, settings: Any, final: bool) -> None:
         self.job.set_settings(settings)
