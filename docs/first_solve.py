@@ -207,7 +207,8 @@ STEPS = (
          "Click three marks of the table, the second and third with Shift, and choose *Ground through tracks*; two "
          "of them, *X axis along tracks*; *Distance between tracks* says that they are 0.96 metres apart. The ground "
          "stands in the plate as a grid. Nothing moves in the picture: it is only said where the world lies.", lines_up,
-         ("Select tracks", "Set ground", "Select tracks", "Set axis", "Set distance")),
+         (*("Select tracks",) * len(GROUND), "Set ground", *("Select tracks",) * len(ACROSS), "Set axis",
+          "Set distance")),
     Step("Stand a cube on the table",
          "Click a mark of the table and choose *Cube at track*. Scrub: the cube stays where it is.", stands,
          ("Select tracks", "Test cube")),
