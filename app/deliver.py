@@ -143,8 +143,8 @@ def _picture(
     path: Path, scene: Scene, size: tuple[int, int], view: tuple[float, float, float], camera: Camera | None = None,
 ) -> None:
     from viewport.picture import render_png
-    from viewport.scene import all_points
+    from viewport.scene import bounding_points, point_arrays
 
-    clouds = [points for points in all_points(scene) if len(points)]
+    clouds = [bounding_points(points) for points in point_arrays(scene) if len(points)]
     points = np.concatenate(clouds) if clouds else np.zeros((1, 3), np.float32)
     render_png(path, scene, camera or frame_points(points, view, size[0] / size[1]), size)

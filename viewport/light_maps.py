@@ -24,7 +24,7 @@ def light_frame(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Matrix light_from_world (4, 4) of a parallel light that sees the whole scene, and the box's size (3,), metres.
 
-    outline : (M, 3), see :func:`viewport.outline.outline_points`.
+    outline : (M, 3), see :class:`viewport.outline.Outline`.
     """
     z = direction(toward)
     x = direction(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))

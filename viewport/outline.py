@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewport.kept import same
-from viewport.scene import Scene, all_points
+from viewport.scene import Scene, bounding_points, point_arrays
 
 DIRECTIONS = 80  # over half a sphere: none is more than 0.25 radians from one of them or its opposite
 POINTS_AT_ONCE = 1 << 10  # that stay in the cache; products so small are made without waiting for other threads
@@ -23,18 +23,16 @@ def _half_sphere(count: int) -> NDArray[np.float32]:
 _SPREAD = np.concatenate([np.eye(3, dtype=np.float32), _half_sphere(DIRECTIONS)])
 
 
-def outline_points(scene: Scene) -> NDArray[np.float32]:
-    """(M, 3): the outermost points of :func:`viewport.scene.all_points` along even directions; none of an empty scene.
+def outline_points(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(M, 3): the outermost of some points (N, 3) along even directions; none of none.
 
-    Along the axes of the world they bound the scene exactly; along any other direction to a fiftieth of its size.
+    Along the axes of the world they bound them exactly; along any other direction to a fiftieth of their size.
     """
-    arrays = [np.asarray(points, np.float32) for points in all_points(scene) if len(points)]
-    if not arrays:
+    if len(points) == 0:
         return np.zeros((0, 3), np.float32)
-    points = np.concatenate(arrays)
     across = np.ptp(points[:: 1 + len(points) // POINTS_AT_ONCE], axis=0)
-    spread = _SPREAD / np.maximum(across, 1e-6 * max(float(across.max()), 1e-30))  # as even for flat and long scenes
-    return _outermost(_outermost(points, spread), spread)
+    spread = _SPREAD / np.maximum(across, 1e-6 * max(float(across.max()), 1e-30))  # as even for what is flat or long
+    return _outermost(_outermost(np.asarray(points, np.float32), spread), spread)
 
 
 def _outermost(points: NDArray[np.float32], spread: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -48,26 +46,27 @@ def _outermost(points: NDArray[np.float32], spread: NDArray[np.float32]) -> NDAr
 
 
 class Outline:
-    """The outline of the scene asked for last."""
+    """The outline of the scene asked for last: of an array that is still the same it is remembered."""
 
     def __init__(self) -> None:
-        self._key: tuple[np.ndarray, ...] | None = None
+        self._parts: list[tuple[np.ndarray, NDArray[np.float32]]] = []  # arrays of the scene and their outlines
         self._points = np.zeros((0, 3), np.float32)
 
     def of(self, scene: Scene) -> NDArray[np.float32]:
-        """See :func:`outline_points`."""
-        key = (
-            *(surface.points for surface in scene.surfaces), *(coat.points for coat in scene.coats),
-            *(lines.points for lines in scene.guides),
-            *(mesh.points for mesh in scene.quick_feathers or scene.feathers),
-        )
-        if not same(self._key, key):
-            self._key, self._points = key, outline_points(scene)
+        """(M, 3): the outermost points of everything, as :func:`outline_points` gives them."""
+        arrays = point_arrays(scene)
+        if not same(tuple(array for array, _ in self._parts), tuple(arrays)):
+            known = {id(array): points for array, points in self._parts}
+            self._parts = [
+                (array, known[id(array)] if id(array) in known else outline_points(bounding_points(array)))
+                for array in arrays]
+            parts = [points for _, points in self._parts]
+            self._points = outline_points(np.concatenate([np.zeros((0, 3), np.float32), *parts]))
         return self._points
 
-    def changed(self) -> None:
-        """An array was written to in place."""
-        self._key = None
+    def changed(self, points: np.ndarray) -> None:
+        """One of the arrays was written to in place."""
+        self._parts = [part for part in self._parts if part[0] is not points]
 
 
 def extent(points: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -79,7 +79,7 @@ class Renderer:
 
     def rows_changed(self, points: np.ndarray, rows: np.ndarray) -> None:
         """Upload again, before the next picture, these rows of an array of hairs or guides written to in place."""
-        self.outline.changed()
+        self.outline.changed(points)
         for coat in self.coats:
             if coat.coat.points is points:
                 coat.textures.mark(rows)

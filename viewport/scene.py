@@ -178,16 +178,21 @@ def root_normals(points: np.ndarray, surface: Surface) -> Floats:
     return np.ascontiguousarray(surface.normals[cKDTree(surface.points).query(roots)[1]], dtype=np.float32)
 
 
-def all_points(scene: Scene) -> list[np.ndarray]:
-    """Arrays (n, 3) that bound the scene: vertices of the surfaces; points of hairs and guides (some of many)."""
-    found = [surface.points for surface in scene.surfaces]
-    found += [mesh.points for mesh in scene.quick_feathers or scene.feathers]
-    for points in [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]:
-        axis = 2 if points.shape[1] == 3 else 1
-        points = points[:: 1 + len(points) // MOST_BOUNDING]
-        for at in np.unique(np.linspace(0, points.shape[axis] - 1, ALONG).astype(np.intp)):
-            found.append(points.take(at, axis=axis))
-    return found
+def point_arrays(scene: Scene) -> list[np.ndarray]:
+    """Arrays (n, 3) of vertices, (N, 3, P) or (N, P, 3) of strands: everything that takes room."""
+    meshes = [surface.points for surface in scene.surfaces]
+    meshes += [mesh.points for mesh in scene.quick_feathers or scene.feathers]
+    return meshes + [coat.points for coat in scene.coats] + [lines.points for lines in scene.guides]
+
+
+def bounding_points(points: np.ndarray) -> np.ndarray:
+    """(n, 3): the vertices of one of :func:`point_arrays`, or points along its strands (some of many)."""
+    if points.ndim == 2:
+        return points
+    axis = 2 if points.shape[1] == 3 else 1
+    points = points[:: 1 + len(points) // MOST_BOUNDING]
+    along = np.unique(np.linspace(0, points.shape[axis] - 1, ALONG).astype(np.intp))
+    return np.concatenate([points.take(at, axis=axis) for at in along])
 
 
 def direction(vector: ArrayLike) -> NDArray[np.float64]:

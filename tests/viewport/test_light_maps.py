@@ -8,8 +8,8 @@ import pytest
 from tests.viewport.scenes import FLAT, ball, camera, hairs, quad
 from viewport.drawables.strands import ABSORPTION
 from viewport.light_maps import light_frame
-from viewport.outline import outline_points
-from viewport.scene import Lights, Scene, all_points
+from viewport.outline import Outline
+from viewport.scene import Lights, Scene, bounding_points, point_arrays
 
 W, H = 160, 160
 KEY_ONLY = {
@@ -85,8 +85,8 @@ def test_roots_inside_a_coat_are_darker_for_its_own_shadow(draw):
 def test_the_light_sees_the_whole_scene(toward):
     skin, coat = ball(count=200)
     scene = Scene(surfaces=(skin,), coats=(coat,))
-    matrix, size = light_frame(outline_points(scene), np.asarray(toward, float))
-    for points in all_points(scene):
+    matrix, size = light_frame(Outline().of(scene), np.asarray(toward, float))
+    for points in map(bounding_points, point_arrays(scene)):
         q = points @ matrix[:3, :3].T + matrix[:3, 3]
         assert np.abs(q).max() <= 1.0
     # nearer to the light is a smaller depth, one unit of which is the size of the box

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.viewport.scenes import ball, hairs
-from viewport.outline import Outline, extent, outline_points
-from viewport.scene import Scene, all_points
+from viewport.outline import Outline, extent
+from viewport.scene import Scene, bounding_points, point_arrays
 
 
 @pytest.mark.parametrize("stretch", [(1, 1, 1), (4, 1, 1), (1, 0.2, 3)])
@@ -13,7 +13,8 @@ def test_it_bounds_the_scene(stretch):
     skin, coat = ball(3000)
     size = np.array(stretch, np.float32)
     scene = Scene((skin._replace(points=skin.points * size),), (coat._replace(points=coat.points * size[:, None]),))
-    every, outline = np.concatenate(all_points(scene)), outline_points(scene)
+    every = np.concatenate([bounding_points(points) for points in point_arrays(scene)])
+    outline = Outline().of(scene)
     assert len(outline) < 1500
     low, high = extent(outline)
     np.testing.assert_array_equal(low, every.min(axis=0))
@@ -31,6 +32,9 @@ def test_it_is_remembered_until_something_is_written_to_in_place():
     first = outline.of(scene)
     assert outline.of(scene._replace(exposure=2.0)) is first
     coat.points[0, 0, -1] = 7.0
-    outline.changed()
+    outline.changed(coat.points)
     assert extent(outline.of(scene))[1].tolist() == [7.0, 0.0, 1.0]
+    moved = hairs([0.0, 0.0, 0.0], [3.0, 0.0, 1.0])
+    assert extent(outline.of(Scene(coats=(coat, moved))))[1].tolist() == [7.0, 0.0, 1.0]
+    assert extent(outline.of(Scene(coats=(moved,))))[1].tolist() == [3.0, 0.0, 1.0]
     assert extent(outline.of(Scene()))[0].tolist() == [-0.5] * 3
