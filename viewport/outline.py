@@ -50,12 +50,12 @@ class Outline:
 
     def __init__(self) -> None:
         self._parts: list[tuple[np.ndarray, NDArray[np.float32]]] = []  # arrays of the scene and their outlines
-        self._points = np.zeros((0, 3), np.float32)
+        self._points: NDArray[np.float32] | None = None
 
     def of(self, scene: Scene) -> NDArray[np.float32]:
         """(M, 3): the outermost points of everything, as :func:`outline_points` gives them."""
         arrays = point_arrays(scene)
-        if not same(tuple(array for array, _ in self._parts), tuple(arrays)):
+        if self._points is None or not same(tuple(array for array, _ in self._parts), tuple(arrays)):
             known = {id(array): points for array, points in self._parts}
             self._parts = [
                 (array, known[id(array)] if id(array) in known else outline_points(bounding_points(array)))
@@ -67,6 +67,7 @@ class Outline:
     def changed(self, points: np.ndarray) -> None:
         """One of the arrays was written to in place."""
         self._parts = [part for part in self._parts if part[0] is not points]
+        self._points = None
 
 
 def extent(points: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -37,4 +37,5 @@ def test_it_is_remembered_until_something_is_written_to_in_place():
     moved = hairs([0.0, 0.0, 0.0], [3.0, 0.0, 1.0])
     assert extent(outline.of(Scene(coats=(coat, moved))))[1].tolist() == [7.0, 0.0, 1.0]
     assert extent(outline.of(Scene(coats=(moved,))))[1].tolist() == [3.0, 0.0, 1.0]
+    outline.changed(moved.points)
     assert extent(outline.of(Scene()))[0].tolist() == [-0.5] * 3
