@@ -37,6 +37,7 @@ CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's mesh
 FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"
 FIRST_TRACK = "<!-- first track -->\n", "\n<!-- end of first track -->"
 FIRST_SOLVE = "<!-- first solve -->\n", "\n<!-- end of first solve -->"
+FIRST_PHOTOMODEL = "<!-- first photomodel -->\n", "\n<!-- end of first photomodel -->"
 STYLES = ("short", "fur", "long", "mane")
 
 
@@ -87,6 +88,15 @@ def first_solve() -> None:
 
     pictures_of_steps(STEPS, SIZE, picture_of)
     _put_chapter("match.md", FIRST_SOLVE, chapter())
+
+
+def first_photomodel() -> None:
+    """Follow the first model of photographs by hand; a picture of the window after every step."""
+    ensure_display()  # before anything of Qt is made
+    from docs.first_photomodel import SIZE, STEPS, chapter, picture_of
+
+    pictures_of_steps(STEPS, SIZE, picture_of)
+    _put_chapter("model.md", FIRST_PHOTOMODEL, chapter())
 
 
 def _put_chapter(page: str, marks: tuple[str, str], chapter: str) -> None:
@@ -169,6 +179,7 @@ def main() -> None:
     first_groom()
     first_pose()
     first_solve()
+    first_photomodel()
     shot()
     evaluator = Evaluator()
     document = demo_document(evaluator)

@@ -185,6 +185,8 @@ def set_world(document: Document, what: str, length: float = 1.0) -> Document:
     counts = {"origin": (1, 1), "axis": (2, 2), "plane": (3, 999), "distance": (2, 2)}
     model, points = _in_hand(document, counts[what], f"the {what}")
     told: dict[str, Any] = {what: points[0] if what == "origin" else points}
+    if what == "plane" and model.frame.origin is None:
+        told["origin"] = points[0]  # at the height of the ground, at least
     if what == "distance":
         if not 1e-9 <= length <= 1e9:
             raise UserError("The distance must be a length above 0, in metres.")

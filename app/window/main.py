@@ -38,6 +38,7 @@ from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
+from app.window.match.model_panel import ModelPanel
 from app.window.match.plate_panel import PlatePanel
 from app.window.match.solve_panel import SolvePanel
 from app.window.match.solve_space import SolveSpace
@@ -161,6 +162,7 @@ class MainWindow(QMainWindow):
             ("respect", RespectPanel(self.desk, memory)),
             ("tracks", Section(PANELS["tracks"][0], TrackList(self.desk), memory, "tracks")),
             ("solve", Section(PANELS["solve"][0], self.solve_panel, memory, "solve")),
+            ("model", Section(PANELS["model"][0], ModelPanel(self.desk, self.match.model), memory, "model")),
             ("plate", Section(PANELS["plate"][0], PlatePanel(self.desk, memory), memory, "plate")),
             ("coat", CoatPanel(self.desk, memory)),
             ("maps", Section(PANELS["maps"][0], MapsPanel(self.desk), memory, "maps")),

@@ -26,6 +26,7 @@ PANELS = {
     "plate": ("Plates", "Shows or hides the list of plates, with film, crop, colours and what tracking sees."),
     "tracks": ("Tracks", "Shows or hides the list of tracks, the worst first, with their curves."),
     "solve": ("Solve", "Shows or hides the solved camera: how good it is, what may be wrong, what to mend."),
+    "model": ("Photomodel", "Shows or hides the model of photographs: its points, the worst first, and what is known."),
     "space": ("Solved scene", "Shows or hides the solved camera in space beside the plate, with its path and points."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
@@ -37,7 +38,7 @@ PANELS = {
 PANEL_CRAFTS = {
     "coat": "groom", "maps": "groom", "feather": "groom", "controls": "pose", "poses": "pose", "library": "pose",
     "rig": "pose", "pose_map": "pose", "tracks": "match", "solve": "match", "plate": "match",
-    "space": "match",
+    "space": "match", "model": "match",
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
 AT_FIRST_HIDDEN = ("curves", "feather", "space")

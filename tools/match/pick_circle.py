@@ -24,7 +24,7 @@ class PickCircle(Tool[CirclePickParams]):
 
     name = "pick_circle"
     label = "Pick circle"
-    icon = "loop"
+    icon = "pick-circle"
     order = 219
     tooltip = "Picks along the outline of something round: three clicks or more in each of two photographs or more."
     hint = "Click: pick along the last circle   Shift: a new circle   Drag: move a pick   Ctrl: a tenth as far"

@@ -19,7 +19,7 @@ class PickEdge(Tool[EdgePickParams]):
 
     name = "pick_edge"
     label = "Pick edge"
-    icon = "measure"
+    icon = "pick-edge"
     order = 218
     tooltip = "Picks anywhere along the straight edge between the two points in hand, where no corner can be seen."
     hint = "Click: pick along the edge of the two points in hand   Drag: move a pick   Ctrl: a tenth as far"

@@ -53,7 +53,7 @@ class PickPoint(Tool[PointPickParams]):
 
     name = "pick_point"
     label = "Pick point"
-    icon = "plant"
+    icon = "pick-point"
     order = 217
     tooltip = "Picks a corner in photographs of one thing; a point in hand is picked in the next photograph too."
     hint = "Click: pick the point in hand, or a new one   Drag: move a pick   Shift: add   Ctrl: a tenth as far"

@@ -24,6 +24,7 @@ from app.window.match.tracking import MatchTracking
 from core.image.plate_view import pixels_per_pixel, plate_size
 from core.overlay import Fill, Overlays, Polyline
 from tools.match_edits import place_at, selected_tracks
+from tools.photomodel_edits import model_of, photo_of
 from tools.solve_edits import solved_of
 from tools.tool import Pointer
 from viewport.plate import Box, PlatePicture
@@ -119,6 +120,10 @@ class PlateView(QObject):
         lines: list[HudLine] = [
             (self.desk.session.tool.label, "accent"), f"{plate.name} · {wide} x {tall} · {zoom:.0f} %",
             f"frame {frame} · {seen} of {len(tracks)} tracks seen" if tracks else f"frame {frame} · no tracks yet"]
+        if (model := model_of(document)) is not None and (photo := photo_of(model, plate.id, frame)) is not None:
+            here = sum(bool((point.picks.photo == photo.id).any()) for point in model.points)
+            place = f"photograph {model.photos.index(photo) + 1} of {len(model.photos)}"
+            lines[-1] = f"{place} · {here} of {len(model.points)} points picked"
         chosen = selected_tracks(document)
         if chosen and (at := np.flatnonzero(chosen[-1].frames == frame)).size:
             track = chosen[-1]
