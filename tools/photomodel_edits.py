@@ -70,8 +70,11 @@ def focal_px(plate: Plate) -> float | None:
 def with_photo(model: Photomodel, plate: Plate, frame: int) -> tuple[Photomodel, Photo]:
     """The model with a frame of a plate among its photographs, and that photograph."""
     found = photo_of(model, plate.id, frame)
-    if found is not None:
+    if found is not None and (found.focal_px is not None or focal_px(plate) is None):
         return model, found
+    if found is not None:  # somebody has said it since
+        told: Photo = found.replace(focal_px=focal_px(plate))
+        return model.replace(photos=tuple(told if one.id == told.id else one for one in model.photos)), told
     width, height = plate_size(plate)
     name = plate.name if plate.first == plate.last else f"{plate.name} {frame}"
     alike = next((p.camera for p in model.photos if (p.plate_id, p.width, p.height) == (plate.id, width, height)), None)

@@ -45,7 +45,7 @@ def test_no_file_was_left_out_and_the_names_are_these():
     ]  # fmt: skip
     assert MATCH == [
         "track_point", "track_box", "track_plane", "roto", "nudge", "ruler", "track_pattern", "pick_point", "pick_edge",
-        "pick_circle",
+        "pick_circle", "line_up_axis",
     ]  # fmt: skip
     assert [*GROOM, *POSE, *MATCH] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)

@@ -124,3 +124,21 @@ def test_deleting_a_point_takes_what_stands_on_it():
     assert (len(model.points), model.known, model.parts) == (len(HOUSE) - 1, (), ())
     with pytest.raises(UserError, match="Select 2 points for distance"):
         edits.add_known(session.document, "distance", (1.0,))
+
+
+def test_edges_drawn_along_axes_give_one_photograph_its_camera_which_follows_their_ends():
+    session = begun()
+    one = PHOTOS[0]
+    for pair, axis in (((0, 1), "x"), ((4, 5), "x"), ((0, 3), "z"), ((4, 7), "z")):
+        model = drag(session, "line_up_axis", seen_by(one, HOUSE[list(pair)])[0], 1, axis=axis, height=2.0)
+        assert session.history.undo_name == "Line-up"
+    (photo,) = model.photos
+    assert photo.focal_px == pytest.approx(one.focal_px, rel=1e-3)
+    np.testing.assert_allclose(photo.rotation, one.rotation, atol=1e-3)
+    np.testing.assert_allclose(photo.translation, one.translation, rtol=0.02)
+    end = model.points[1].picks.xy[0]
+    after = drag(session, "pick_point", [end, end + np.array([0.0, 40.0])], 1)
+    assert not np.allclose(after.photos[0].rotation, photo.rotation, atol=1e-3)
+    session.undo()
+    session.undo()
+    assert session.document.photomodels[0].photos[0].rotation is None

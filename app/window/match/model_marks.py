@@ -10,13 +10,15 @@ from core.document import Document
 from core.errors import UserError
 from core.match.photomodel.build import built
 from core.match.photomodel.guide import epipolar_line, foretold
-from core.match.photomodel.records import ModelCircle, ModelPoint, Photo, Photomodel
+from core.match.photomodel.records import Known, ModelCircle, ModelPoint, Photo, Photomodel
 from core.match.photomodel.rows import seen_by
 from core.overlay import Circle, Label, Marker, Overlay, Overlays, Polyline, Tone
 from tools.photomodel_edits import active_point, model_of, photo_of, points_in_hand
 
 Array = NDArray[np.float64]
 OFF = 2.0  # times the sharpness of a pick by which it may miss before it is shown as trouble
+TONES: tuple[Tone, ...] = ("x", "y", "z")
+GRID = 8  # squares of the ground to each side of the origin
 ROUND = np.linspace(0.0, 2.0 * np.pi, 65)
 
 
@@ -27,7 +29,12 @@ def model_marks(document: Document, sheet: Sheet) -> Overlays:
     if model is None or photo is None:
         return ()
     out: list[Overlay] = []
+    for known in model.known:
+        if known.kind == "axis":
+            out += _along(model, known, photo, sheet)
     if photo.rotation is not None:
+        if any(known.kind == "axis" for known in model.known):
+            out += _ground(photo, sheet)
         out += _edges(model, photo, sheet)
         for circle in model.circles:
             out += _circle(circle, photo, sheet)
@@ -78,6 +85,50 @@ def _point(model: Photomodel, point: ModelPoint, photo: Photo, sheet: Sheet, sel
         words = point.name if there is None else f"{point.name}  {miss:.2f} px"
         out.append(Label(x + 8.0 * ratio, y - 6.0 * ratio, words, tone, True))
     return out
+
+
+def _along(model: Photomodel, known: Known, photo: Photo, sheet: Sheet) -> list[Overlay]:
+    """An edge that is known to lie along an axis, in the colour of that."""
+    picks = [point.picks for id_ in known.points for point in model.points if point.id == id_]
+    ends = [one.xy[one.photo == photo.id] for one in picks]
+    if not all(len(one) for one in ends):
+        return []
+    return [Polyline(sheet.at(np.concatenate(ends)), TONES[int(np.argmax(np.abs(known.value)))], 2.0)]
+
+
+def _ground(photo: Photo, sheet: Sheet) -> list[Overlay]:
+    """The horizon, a grid about the origin of the ground and the axes there, by the camera of a photograph."""
+    assert photo.rotation is not None
+    assert photo.translation is not None
+    eye = -photo.rotation.T @ np.array(photo.translation)
+    step = 10.0 ** np.floor(np.log10(max(float(np.linalg.norm(eye)), 1e-9))) / 2.0
+    out: list[Overlay] = []
+    ways = np.linspace(0.0, 2.0 * np.pi, 145)
+    far = eye + 1e6 * step * np.stack([np.cos(ways), np.zeros(145), np.sin(ways)], axis=1)
+    out += _lines(far, photo, sheet, "plain", dashed=True)
+    along = np.linspace(-GRID, GRID, 8 * GRID + 1) * step
+    for k in range(-GRID, GRID + 1):
+        across = np.full_like(along, k * step)
+        level = np.zeros_like(along)
+        for line in (np.stack([across, level, along], axis=1), np.stack([along, level, across], axis=1)):
+            out += _lines(line, photo, sheet, "faint")
+    for axis, tone in enumerate(TONES):
+        line = np.zeros((33, 3))
+        line[:, axis] = np.linspace(0.0, 2.0 * step, 33)
+        out += _lines(line, photo, sheet, tone, width=2.5)
+    return out
+
+
+def _lines(
+    points: Array, photo: Photo, sheet: Sheet, tone: Tone, width: float = 1.0, *, dashed: bool = False,
+) -> list[Overlay]:
+    """The pieces of a line through points of the world that lie before the camera and about the picture."""
+    pixels, ahead = seen_by(photo, points)
+    size = np.array([photo.width, photo.height])
+    seen = (ahead > 0.0) & (np.abs(pixels - 0.5 * size) < size).all(axis=1)
+    rows = np.flatnonzero(seen)
+    pieces = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    return [Polyline(sheet.at(pixels[piece]), tone, width, dashed=dashed) for piece in pieces if len(piece) > 1]
 
 
 def _guide(model: Photomodel, photo: Photo, sheet: Sheet) -> list[Overlay]:

@@ -13,6 +13,7 @@ from core.errors import UserError
 from core.match.photomodel.begin import placed, with_rays
 from core.match.photomodel.records import NOTHING, Photomodel
 from core.match.photomodel.rows import Table, constraints_of, table_of
+from core.match.photomodel.vanish import lined_up
 from core.match.solve.bundle import POSE, Free, adjust
 from core.match.solve.constraints import HARD, Constraint, Pull, circle_of
 from core.match.solve.coordinates import Frame, Similarity, onto, to_frame
@@ -91,13 +92,12 @@ def is_solved(model: Photomodel) -> bool:
 def live(model: Photomodel) -> Photomodel:
     """The model under a hand: solved again where only little has changed, left as it is where that cannot be.
 
-    Points that were just picked a second time get their first place from their rays.
+    Points that were just picked a second time get their first place from their rays; a single photograph with edges
+    along axes its camera from those.
     """
     ready = with_rays(model)
-    if not is_solved(ready):
-        return model
     try:
-        return solved(ready).model
+        return solved(ready).model if is_solved(ready) else lined_up(model)
     except UserError:
         return model
 
