@@ -136,6 +136,8 @@ def test_edges_drawn_along_axes_give_one_photograph_its_camera_which_follows_the
     assert photo.focal_px == pytest.approx(one.focal_px, rel=1e-3)
     np.testing.assert_allclose(photo.rotation, one.rotation, atol=1e-3)
     np.testing.assert_allclose(photo.translation, one.translation, rtol=0.02)
+    with pytest.raises(UserError, match="Nothing is built"):
+        built(model)
     end = model.points[1].picks.xy[0]
     after = drag(session, "pick_point", [end, end + np.array([0.0, 40.0])], 1)
     assert not np.allclose(after.photos[0].rotation, photo.rotation, atol=1e-3)

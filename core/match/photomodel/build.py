@@ -37,7 +37,7 @@ class Builder:
             (0, point.id): np.array(point.place) for point in model.points if point.place is not None
         }
         there = np.array(list(self.places.values())).reshape(-1, 3)
-        self.size = float(np.ptp(there, axis=0).max(initial=0.0)) or 1.0
+        self.size = (float(np.ptp(there, axis=0).max()) if len(there) else 0.0) or 1.0
         self.pieces: dict[int, _Piece] = {}
         for part in model.parts:
             self.pieces[part.id] = getattr(self, f"_{part.kind}")(part)
