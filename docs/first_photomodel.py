@@ -126,6 +126,25 @@ def drags(hand: Hand, folder: Path) -> None:
     hand.rest()
 
 
+def lines_up(hand: Hand, folder: Path) -> None:
+    """A model is begun by edges of one photograph, drawn along the axes."""
+    desk = hand.window.desk
+    hand.window.match.doors.open_plate(photographed(folder))
+    hand.until(lambda: bool(desk.document.plates), 60_000)
+    hand.until(hand.window.viewport.isExposed)
+    desk.set_workspace(frame=2.0)
+    desk.choose("line_up_axis")
+    hand.rest()
+    for start, end, keys in ((0, 1, NONE), (4, 5, NONE), (0, 3, SHIFT), (4, 7, SHIFT)):
+        first, last = pixel_of(hand, corner(start, 2)), pixel_of(hand, corner(end, 2))
+        QTest.mousePress(hand.view, LEFT, keys, first)
+        for part in (0.25, 0.5, 0.75, 1.0):
+            QTest.mouseMove(hand.view, first + (last - first) * part)
+            hand.painted()
+        QTest.mouseRelease(hand.view, LEFT, keys, last)
+        hand.rest()
+
+
 STEPS = (
     Step("Take the photographs in",
          "File, Open plate, one of them; stills whose names are numbered come in together, others one after the other. "
@@ -153,6 +172,8 @@ STEPS = (
          "pick to where the other photographs say that it should be: this one is wrong, and undo takes it back.",
          drags, ("Move pick",)),
 )
+
+LINE_UP = (Step("Line up one photograph", "", lines_up, ("Open plate", *(("Line-up",) * 4))),)
 
 
 def picture_of(number: int) -> str:

@@ -93,9 +93,10 @@ def first_solve() -> None:
 def first_photomodel() -> None:
     """Follow the first model of photographs by hand; a picture of the window after every step."""
     ensure_display()  # before anything of Qt is made
-    from docs.first_photomodel import SIZE, STEPS, chapter, picture_of
+    from docs.first_photomodel import LINE_UP, SIZE, STEPS, chapter, picture_of
 
     pictures_of_steps(STEPS, SIZE, picture_of)
+    pictures_of_steps(LINE_UP, SIZE, lambda number: "line-up.jpg")
     _put_chapter("model.md", FIRST_PHOTOMODEL, chapter())
 
 

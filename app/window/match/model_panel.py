@@ -99,8 +99,7 @@ def figures_of(model: Photomodel) -> str:
     away = sorted(misses(model).values())
     parts = f"{len(model.parts) or 'no'} part{'' if len(model.parts) == 1 else 's'} built"
     words = f"{len(there)} of {len(model.photos)} photographs, {placed} of {len(model.points)} points solved; {parts}"
-    if not away:
-        return words
     focal = sorted({round(photo.focal_px, 1) for photo in there if photo.focal_px is not None})
-    told = f"{focal[0]:.1f} px" if len(focal) == 1 else f"{focal[0]:.1f} to {focal[-1]:.1f} px" if focal else "unknown"
-    return f"{words}\nmedian {away[len(away) // 2]:.2f}   worst {away[-1]:.2f} px\nfocal length {told}"
+    if focal:
+        words += f"\nfocal length {focal[0]:.1f}" + (f" to {focal[-1]:.1f} px" if len(focal) > 1 else " px")
+    return f"{words}\nmedian {away[len(away) // 2]:.2f}   worst {away[-1]:.2f} px" if away else words
