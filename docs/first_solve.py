@@ -172,8 +172,11 @@ def stands(hand: Hand, folder: Path) -> None:
 
 
 def gives(hand: Hand, folder: Path) -> None:
-    hand.window.match.doors.export_camera(folder / "table.usda")
-    hand.rest()
+    doors = hand.window.match.doors
+    for give, name in ((doors.export_camera, "table.usda"), (doors.write_check_movie, "table.mp4"),
+                       (doors.export_lens_maps, "table.exr")):
+        give(folder / name)
+        hand.rest()
 
 
 def off_the_plane(hand: Hand) -> NDArray[np.float64]:
@@ -214,7 +217,8 @@ STEPS = (
          ("Select tracks", "Test cube")),
     Step("Give the camera away",
          "File, Export camera, `table.usda`; the suffix names the program. It has one camera with a sample for every "
-         "frame, and the points.", gives),
+         "frame, and the points. *Movie of the solve* writes the plate with all that stands over it, for others to "
+         "judge; *Export lens maps* writes STMaps where the lens bends.", gives),
 )
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
 from core.camera import project
@@ -45,4 +47,12 @@ def test_the_first_solve_followed_literally(home: Path, qapp: object) -> None:  
         told = shot.pixels(row, base + corners * (1.0, -1.0, -1.0))
         seen = project(camera(frame - FIRST), MARKS[2] + corners, *PLATE).xy
         assert np.linalg.norm(told - seen, axis=1).max() < 4.0
+    film = cv2.VideoCapture(str(home / "table.mp4"))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == FRAMES
+    film.release()
+    wide, tall = PLATE
+    for way in ("undistort", "redistort"):  # of a lens that bends nothing
+        places = oiio.ImageBuf(str(home / f"table.{way}.exr")).get_pixels(oiio.FLOAT)
+        np.testing.assert_allclose(places[0, :, 0], (np.arange(wide) + 0.5) / wide, atol=1e-5)
+        np.testing.assert_allclose(places[:, 0, 1], 1.0 - (np.arange(tall) + 0.5) / tall, atol=1e-5)
     hand.window.close_unasked()

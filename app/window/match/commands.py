@@ -292,4 +292,11 @@ PLATE_FILES: tuple[Command, ...] = (
     Command("file.export_camera", "Export camera…", "Writes the solved camera; its suffix names the program.",
             lambda w: w.match.doors.ask_export_camera(), "core.formats.shot_file.write_shot", "file",
             enabled=needs_solved_plate, icon="export", words="3d save solve usd nuke maya blender colmap matchmove"),
+    Command("file.export_lens_maps", "Export lens maps…", "Writes STMaps that take the bend of the solved lens out of "
+            "the plate, and put it back.", lambda w: w.match.doors.ask_lens_maps(),
+            "core.formats.stmap_file.write_stmap", "file", enabled=needs_solved_plate, icon="export",
+            words="stmap undistort redistort exr distortion overscan"),
+    Command("file.check_movie", "Movie of the solve…", "Writes the plate with points, ground and test cubes as a "
+            "movie, to judge the solve by.", lambda w: w.match.doors.ask_check_movie(), "app.movie.write_movie", "file",
+            enabled=needs_solved_plate, icon="playblast", words="qc quality overlay playblast mp4 matchmove check"),
 )

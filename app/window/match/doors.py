@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
+from app.movie import MOVIE_SUFFIXES
 from app.window.desk import Desk
 from app.window.files.opening import choose_file, filter_of
+from app.window.jobs import Asked, Progress
 from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
 from core.formats.plate_file import MOVIES, PICTURES, read_plate
+from core.formats.stmap_file import write_stmap
 from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.plate import Plate
@@ -22,6 +26,9 @@ from core.match.solved import SolvedCamera, shot_of_record
 from tools.match_edits import add_plate, add_tracks, shown_plate
 from tools.plate_edits import relink_plate
 from tools.solve_edits import solved_of
+
+if TYPE_CHECKING:
+    from core.match.lens_maps import Canvas
 
 CAMERAS = (".usda", ".usdc", ".abc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
@@ -138,6 +145,51 @@ class MatchDoors(QObject):
         self._desk.jobs.start(
             f"Write {path.name}", lambda progress, cancelled: write_shot(path, shot, {"kind": solved.kind}),
             lambda nothing: self._desk.said.emit(f"The camera was written to {path.name}."))
+
+    def ask_check_movie(self) -> None:
+        """Let the artist name a movie of the plate with what the solve puts over it."""
+        self._solved()
+        choose_file(self._parent, "Movie of the solve", [filter_of("Movies", MOVIE_SUFFIXES)],
+                    lambda path: self._desk.attempt(self.write_check_movie, path), save=".mp4")
+
+    def write_check_movie(self, path: Path) -> None:
+        """Write the solved frames of the plate in view as a movie, in a job."""
+        from app.window.match.check_movie import write_check_movie  # with the writer of movies
+
+        plate, solved, fps, saved = self._plate(), self._solved(), self._desk.document.fps, self._desk.session.path
+        root = None if saved is None else saved.parent
+        self._desk.jobs.start(
+            f"Write {path.name}",
+            lambda progress, cancelled: write_check_movie(path, plate, solved, fps, root, progress),
+            lambda count: self._desk.said.emit(f"{count} frames of the plate with the solve are in {path.name}."))
+
+    def ask_lens_maps(self) -> None:
+        """Let the artist name the STMaps of the solved lens."""
+        self._solved()
+        choose_file(self._parent, "Export lens maps", [filter_of("STMaps", (".exr",))],
+                    lambda path: self._desk.attempt(self.export_lens_maps, path), save=".exr")
+
+    def export_lens_maps(self, path: Path) -> None:
+        """Write two STMaps of the solved lens, NAME.undistort.exr and NAME.redistort.exr, in a job."""
+        solved = self._solved()
+        if path.suffix.lower() != ".exr":
+            raise UserError(f"{path.name}: maps are written as .exr; give a name that ends so.")
+        names = tuple(path.with_name(f"{path.stem}.{way}.exr") for way in ("undistort", "redistort"))
+
+        def work(progress: Progress, cancelled: Asked) -> Canvas:
+            from core.match.lens_maps import canvas, redistort_map, undistort_map  # of the solver, which is large
+
+            room = canvas(solved.lens, solved.size)
+            for number, (name, make) in enumerate(zip(names, (undistort_map, redistort_map), strict=True)):
+                progress(0.5 * number)
+                with atomic_write(name) as beside:
+                    write_stmap(beside, make(solved.lens, solved.size, room))
+            return room
+
+        self._desk.jobs.start(
+            f"Write lens maps {path.stem}", work, lambda room: self._desk.said.emit(
+                f"{names[0].name} and {names[1].name}: the straight picture has {room.size[0]} x {room.size[1]} "
+                "pixels."))
 
     def _solved(self) -> SolvedCamera:
         solved = solved_of(self._desk.document, self._plate().id)
