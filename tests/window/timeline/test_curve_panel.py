@@ -186,7 +186,7 @@ def test_every_curve_fills_the_height_when_asked(host: Host, panel: CurvePanel) 
 
 
 def test_a_panel_that_is_new_since_a_workspace_was_saved_is_shown() -> None:
-    assert shown_panels(()) == tuple(name for name in PANELS if name not in ("curves", "feather"))
+    assert shown_panels(()) == tuple(name for name in PANELS if name not in ("curves", "feather", "space"))
     old = written_panels({"scene", "curves"})
     assert shown_panels(old) == ("scene", "curves")
     assert "maps" in shown_panels([name for name in old if "maps" not in name])
