@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 from app.movie import MOVIE_SUFFIXES
 from app.window.desk import Desk
 from app.window.files.opening import choose_file, filter_of
-from app.window.jobs import Asked, Progress
+from app.window.jobs import Asked, Cancelled, Job, Progress
 from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
@@ -30,6 +30,7 @@ from tools.solve_edits import solved_of
 if TYPE_CHECKING:
     from core.match.lens_maps import Canvas
 
+Work = Callable[[Progress, Asked], Any]
 CAMERAS = (".usda", ".usdc", ".abc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
 
@@ -40,6 +41,8 @@ class MatchDoors(QObject):
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(desk)
         self._desk, self._parent = desk, parent
+        self._writing: Job | None = None
+        self._waiting: list[tuple[str, Work, Callable[[Any], None]]] = []
 
     def ask_plate(self) -> None:
         """Let the artist choose a frame of a plate, or a movie."""
@@ -142,7 +145,7 @@ class MatchDoors(QObject):
         check_writable(path)
         solved = self._solved()
         shot = shot_of_record(solved, {track.id: track.name for track in self._desk.document.tracks})
-        self._desk.jobs.start(
+        self._write(
             f"Write {path.name}", lambda progress, cancelled: write_shot(path, shot, {"kind": solved.kind}),
             lambda nothing: self._desk.said.emit(f"The camera was written to {path.name}."))
 
@@ -158,7 +161,7 @@ class MatchDoors(QObject):
 
         plate, solved, fps, saved = self._plate(), self._solved(), self._desk.document.fps, self._desk.session.path
         root = None if saved is None else saved.parent
-        self._desk.jobs.start(
+        self._write(
             f"Write {path.name}",
             lambda progress, cancelled: write_check_movie(path, plate, solved, fps, root, progress),
             lambda count: self._desk.said.emit(f"{count} frames of the plate with the solve are in {path.name}."))
@@ -186,10 +189,36 @@ class MatchDoors(QObject):
                     write_stmap(beside, make(solved.lens, solved.size, room))
             return room
 
-        self._desk.jobs.start(
+        self._write(
             f"Write lens maps {path.stem}", work, lambda room: self._desk.said.emit(
                 f"{names[0].name} and {names[1].name}: the straight picture has {room.size[0]} x {room.size[1]} "
                 "pixels."))
+
+    def _write(self, name: str, work: Work, done: Callable[[Any], None]) -> None:
+        """Write in a job, one file after another: USD, while it is loaded, waits for ever for another library that is
+        loaded on another thread at that moment."""
+        self._waiting.append((name, work, done))
+        self._write_next()
+
+    def _write_next(self) -> None:
+        if self._writing is not None or not self._waiting:
+            return
+        name, work, done = self._waiting.pop(0)
+
+        def ended(result: Any) -> None:
+            self._writing = None
+            done(result)
+            self._write_next()
+
+        def failed(error: Exception) -> None:
+            self._writing = None
+            if isinstance(error, Cancelled):
+                self._desk.said.emit(f"{name}: cancelled.")
+            else:
+                self._desk.error(error)
+            self._write_next()
+
+        self._writing = self._desk.jobs.start(name, work, ended, failed)
 
     def _solved(self) -> SolvedCamera:
         solved = solved_of(self._desk.document, self._plate().id)
