@@ -200,6 +200,7 @@ def _in_frame(
         return state, constraints, said
     distances = [one for one in constraints if one.kind == "distance"]
     state = _framed(model, state, known).state(state)
+    state = _headed(constraints, state)
     if distances and model.frame.distance is None:
         i, j = distances[0].points
         state = to_frame(Frame(distance=(i, j, distances[0].value[0])), state.points).state(state)
@@ -229,6 +230,18 @@ def _framed(model: Photomodel, state: State, known: Flags) -> Similarity:
         plane=None if frame.plane is None else tuple(rows[id_] for id_ in frame.plane),
         distance=None if frame.distance is None else (rows[frame.distance[0]], rows[frame.distance[1]], frame.length),
     ), state.points, up)
+
+
+def _headed(constraints: list[Constraint], state: State) -> State:
+    """The state turned about y so that the first edge known to lie along a level axis leads along it, not against."""
+    for one in constraints:
+        if one.kind == "axis" and np.hypot(one.value[0], one.value[2]) > abs(one.value[1]):
+            way = state.points[one.points[1]] - state.points[one.points[0]]
+            angle = np.arctan2(way[2], way[0]) - np.arctan2(one.value[2], one.value[0])
+            cos, sin = np.cos(angle), np.sin(angle)
+            turn = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
+            return Similarity(1.0, turn, np.zeros(3)).state(state)
+    return state
 
 
 def _upright(up: Array) -> Array:

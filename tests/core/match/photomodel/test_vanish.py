@@ -4,8 +4,9 @@ import pytest
 from core.errors import UserError
 from core.match.photomodel.records import Known, ModelPoint, Photomodel, picked
 from core.match.photomodel.rows import seen_by
+from core.match.photomodel.solve import solved
 from core.match.photomodel.vanish import lined_up
-from tests.core.match.photomodel.scenes import FOCAL, HOUSE, PHOTOS, photo
+from tests.core.match.photomodel.scenes import FOCAL, HOUSE, PHOTOS, house, photo, places
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ALONG = (((0, 1), X), ((4, 5), X), ((0, 3), Z), ((4, 7), Z), ((0, 4), Y), ((1, 5), Y))
@@ -56,3 +57,12 @@ def test_edges_that_do_not_converge_are_refused_in_words():
         for rows in ((0, 1, 2, 3), (0, 1, 4, 5)):
             with pytest.raises(UserError, match="do not converge"):
                 lined_up(lines(one, [ALONG[k] for k in rows], noise=0.3))
+
+
+def test_a_model_begun_by_a_line_up_has_its_world():
+    model = house(0)
+    known = tuple(Known(kind="axis", points=(a + 1, b + 1), value=axis) for (a, b), axis in ALONG[:4])
+    there = places(solved(model.replace(known=known)).model)
+    for (a, b), axis in ALONG:
+        way = there[b] - there[a]
+        np.testing.assert_allclose(way / np.linalg.norm(way), axis, atol=3e-3)
