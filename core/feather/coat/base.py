@@ -12,20 +12,18 @@ from core.feather.coat.bed import Bed
 from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.frames import turned, unit
 from core.feather.coat.ground import curvatures, smoothed
-from core.feather.coat.layering import Feathers, Limits
+from core.feather.coat.layering import Feathers
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST
 from core.random import rand
 
 BODY = 0.9  # length and width of a feather times the curvature of the body below it stay under this
-GIVE = np.radians(1.2)  # by which a frame may lift a feather where the skin does not bend
-YIELD = 1.0  # radians beyond that for a unit of stretch and shear
-SHRINK = 2.0  # how readily a frame shortens a feather where the skin lets it rise by a radian
+YIELD = 1.0  # how readily feathers draw in where the skin strains, or bends below them by a radian
 ABOVE_SKIN = 0.02  # spacings that a root stands out of the skin
 FAN = np.radians(8.0), np.radians(4.0), np.radians(3.0), 0.15  # variation of yaw, lift, roll, length
 
 
 class Base(NamedTuple):
-    """Feathers before they settle. give : what a frame may do to them beyond the rest.
+    """Feathers before they settle.
 
     feathers : vanes, roots, frames and ranks. poses : (N, 6) float64. fields : named columns (N,) expressions read.
     """
@@ -33,21 +31,19 @@ class Base(NamedTuple):
     feathers: Feathers
     poses: NDArray[np.float64]
     fields: dict[str, Any]
-    give: Limits
 
 
 class Stand(NamedTuple):
     """What N feathers stand on, at rest or in one pose of the skin.
 
     positions : (N, 3) float32. frames : (N, 3, 3) float32 without yaw. bend : (N, 3), see ``curved``.
-    limit : (N,) factor on lengths, always that of rest. give : as in :class:`Base`.
+    limit : (N,) factor on lengths.
     """
 
     positions: NDArray[np.float32]
     frames: NDArray[np.float32]
     bend: NDArray[np.float64]
     limit: NDArray[np.float64]
-    give: Limits
 
 
 def lie_down(
@@ -86,7 +82,7 @@ def lie_down(
     frames = turned(frames, yaw)
     roots = stand.positions + (ABOVE_SKIN * bed.ground.spacing[:, None] * normals).astype(np.float32)
     feathers = Feathers(own, np.ascontiguousarray(roots, np.float32), frames, rank)
-    return Base(feathers, poses, fields, stand.give)
+    return Base(feathers, poses, fields)
 
 
 def changed_rows(before: Base, after: Base) -> NDArray[np.int32] | None:
@@ -115,9 +111,15 @@ def limited(length: NDArray[np.float64], bend: NDArray[np.float64]) -> NDArray[n
     return np.asarray(1.0 / np.sqrt(1.0 + (length * tight / BODY) ** 2))
 
 
-def giving(more: NDArray[np.float64]) -> Limits:
-    """What a frame may do to feathers where it may lift them by `more` (N,) radians than where the skin stays."""
-    return Limits(GIVE + more, 1.0 / (1.0 + SHRINK * more))
+def drawn_in(
+    length: NDArray[np.float64], rest_bend: NDArray[np.float64], bend: NDArray[np.float64], strain: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Factor (N,) on lengths where the skin moves: a smooth function of it alone, so that few feathers come to cross.
+
+    rest_bend, bend : (N, 3), see ``curved``. strain : (N,), see ``strained``.
+    """
+    turned_by = length * np.abs(bend - rest_bend).max(axis=1)
+    return np.asarray(1.0 / (1.0 + YIELD * (strain + turned_by)))
 
 
 def strained(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.feather.coat.crossing import vane_boxes
-from core.feather.coat.layering import Crossings, Feathers, Layered, Limits, crossings, layer
+from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
 from core.feather.coat.plumage import Laid
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
 from core.workers import Workers
@@ -80,7 +80,7 @@ def added_at_rest(rest: Laid, workers: Workers) -> NDArray[np.float64]:
     """
     rows = shown_rows(rest)
     rigid = _rigid(rest, rows, workers)
-    settled = _settled(rigid, rigid.poses, rest, workers, None).poses
+    settled = _settled(rigid, rigid.poses, rest, workers, True).poses
     added = np.tile([0.0, 0.0, 1.0], (len(rest.ids), 1))
     added[rows, :2] = settled[:, [LIFT, ROLL]] - rigid.poses[:, [LIFT, ROLL]]
     added[rows, 2] = settled[:, LENGTH] / rigid.poses[:, LENGTH]
@@ -102,8 +102,7 @@ def instances(laid: Laid, workers: Workers, added: NDArray[np.float64] | None = 
     if added is not None:
         poses[:, [LIFT, ROLL]] += added[rows, :2]
         poses[:, LENGTH] *= added[rows, 2]
-    limits = None if added is None else Limits(laid.give.lift[rows], laid.give.length[rows])
-    settled = _settled(rigid, poses, laid, workers, limits)
+    settled = _settled(rigid, poses, laid, workers, added is None)
     feathers = rigid.feathers
     turns = quaternions(feathers.frames, settled.poses).astype(np.float32)
     scales = settled.poses[:, LENGTH].astype(np.float32)
@@ -152,11 +151,11 @@ def _rigid(laid: Laid, rows: NDArray[np.int32], workers: Workers) -> _Rigid:
 
 
 def _settled(
-    rigid: _Rigid, poses: NDArray[np.float64], laid: Laid, workers: Workers, limits: Limits | None
+    rigid: _Rigid, poses: NDArray[np.float64], laid: Laid, workers: Workers, at_rest: bool
 ) -> Layered:
     near = np.full((len(poses), 1), -1, np.int32)  # nobody follows: each has its place already
     return layer(
-        rigid.feathers, poses, near, laid.skin.bvh, workers, bent_back=0.0, limits=limits)
+        rigid.feathers, poses, near, laid.skin.bvh, workers, bent_back=0.0, at_rest=at_rest)
 
 
 def _error(

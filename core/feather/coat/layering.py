@@ -2,7 +2,7 @@
 
 At rest feathers are raised out of the skin together with their neighbours, settled in the growth order, and what that
 added to each pose is kept by feather. A frame of an animation begins from the rest's additions, never from another
-frame's, and only lifts what newly crosses.
+frame's, and only lifts what newly crosses, by so little that no feather is seen to jump.
 """
 
 from __future__ import annotations
@@ -51,16 +51,6 @@ class Layered(NamedTuple):
     second: NDArray[np.int32]
 
 
-class Limits(NamedTuple):
-    """What a frame of an animation may do to N feathers, so that none is seen to jump.
-
-    lift : (N,) float64, radians beyond the rest. length : (N,) float64, the least factor on its length.
-    """
-
-    lift: NDArray[np.float64]
-    length: NDArray[np.float64]
-
-
 class Crossings(NamedTuple):
     """What still passes through what: rows of feathers.
 
@@ -77,15 +67,15 @@ class Crossings(NamedTuple):
 
 def layer(
     feathers: Feathers, base: NDArray[np.float64], near: NDArray[np.int32], bvh: Bvh, workers: Workers,
-    bent_back: float = BENT_BACK, limits: Limits | None = None,
+    bent_back: float = BENT_BACK, at_rest: bool = True,
 ) -> Layered:
     """Settle a whole coat from its base poses (N, 6).
 
     near : (N, K) int32, neighbours on the skin, see ``ground``. bvh : the skin in the same pose.
     bent_back : share of an added lift that is bent back; 0 where shapes are given, as those of prototypes are.
-    limits : of a frame of an animation, in which no feather rolls either; None at rest, for as much as it takes.
+    at_rest : with as much change as it takes; False for a frame of an animation, see ``settle_rows``.
     """
-    poses = raised(feathers, base, near, bvh, workers, bent_back) if limits is None else base.copy()
+    poses = raised(feathers, base, near, bvh, workers, bent_back) if at_rest else base.copy()
     vanes = pose_vanes(feathers.own, poses, feathers.roots, feathers.frames, ranges=workers.ranges)
     boxes = vane_boxes(vanes, workers.ranges)
     first, second = touching_boxes(_widened(boxes, poses))
@@ -95,7 +85,7 @@ def layer(
     suspects[first[meet]] = True
     suspects[second[meet]] = True
     suspects |= skin_crossings(vanes, boxes, bvh, ranges=workers.ranges)
-    _settle(feathers, laid, suspects, bvh, bent_back, limits)
+    _settle(feathers, laid, suspects, bvh, bent_back, at_rest)
     return laid
 
 
@@ -228,17 +218,14 @@ def _pairs_of(
 
 def _settle(
     feathers: Feathers, laid: Layered, suspects: NDArray[np.bool_], bvh: Bvh, bent_back: float,
-    limits: Limits | None = None,
+    at_rest: bool = True,
 ) -> None:
     if not suspects.any():
         return
     rows = neighbour_rows(len(suspects), laid.first, laid.second)
     order = np.ascontiguousarray(np.lexsort((np.arange(len(suspects)), feathers.rank))[::-1], np.int32)
     moved = np.zeros(len(suspects), np.bool_)
-    count = len(suspects)
-    most, shortest = (np.full(count, np.inf), np.zeros(count)) if limits is None else limits
     settle_rows(
         order, feathers.rank, rows.start, rows.other, feathers.own, feathers.roots, feathers.frames, bvh.boxes,
-        bvh.children, bvh.corners, limits is None, bent_back,
-        most, shortest, suspects, moved, laid.poses, laid.vanes, laid.boxes,
+        bvh.children, bvh.corners, at_rest, bent_back, suspects, moved, laid.poses, laid.vanes, laid.boxes,
     )

@@ -16,12 +16,11 @@ from core import value as values
 from core.curve import Curve
 from core.evaluator import Evaluator
 from core.feather.coat.base import (
-    YIELD,
     Base,
     Stand,
     changed_rows,
     curved,
-    giving,
+    drawn_in,
     lie_down,
     limited,
     own_curves,
@@ -34,7 +33,7 @@ from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.frames import carried, field_frames, key_frames
 from core.feather.coat.ground import smoothed
 from core.feather.coat.keys import attributes_of_keys, interpolate, key_shapes
-from core.feather.coat.layering import Feathers, Layered, Limits, layer, layer_again
+from core.feather.coat.layering import Feathers, Layered, layer, layer_again
 from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import LENGTH, pose_vanes
@@ -59,7 +58,7 @@ class Laid(NamedTuple):
     """A coat at one frame, the rows those of the bed.
 
     ids : (N,) int32. shown : (N,) bool, what density keeps. layered : poses, vanes, boxes.
-    feathers : vanes at length 1, roots, frames. skin : the skin in the same pose. give : see :class:`Base`.
+    feathers : vanes at length 1, roots, frames. skin : the skin in the same pose.
     """
 
     ids: NDArray[np.int32]
@@ -69,7 +68,6 @@ class Laid(NamedTuple):
     bed: Bed
     skin: Skin
     fields: dict[str, Any]
-    give: Limits
 
 
 class Plumage:
@@ -121,8 +119,7 @@ class Plumage:
             poses = base.poses + (rest.layered.poses - resting.poses)
             poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
             if coat.layered:
-                layered = layer(
-                    base.feathers, poses, bed.ground.near, skin.bvh, workers, limits=base.give)
+                layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, at_rest=False)
             else:
                 layered = _unlayered(base.feathers, poses, workers.ranges)
         if coat.proxies:
@@ -219,14 +216,13 @@ class Plumage:
         numbers = {name: self._number(coat, name, fields, now, mesh, keys, bed) for name in FEATHER_VALUES}
         if skin is None:
             fields["limit"] = limited(fields["length"], bend_of)
-            stand = Stand(bed.positions, rest_frames, bend_of, fields["limit"], giving(np.zeros(count)))
+            stand = Stand(bed.positions, rest_frames, bend_of, fields["limit"])
         else:
             positions, frames, flow = carried(mesh, bed, rest_frames, flow_frames, skin)
             bends = curved(positions, flow, near, ranges)
-            # where the skin bends or stretches, feathers may rise; elsewhere so little that nothing is seen to jump
             strain = strained(bed.positions, flow_frames, positions, flow, near)
-            give = giving(YIELD * strain + fields["length"] * np.abs(bends - bend_of).max(axis=1))
-            stand = Stand(positions, frames, bends, fields["limit"], give)
+            drawn = drawn_in(fields["length"], bend_of, bends, strain)
+            stand = Stand(positions, frames, bends, fields["limit"] * drawn)
         curves = self._remember("own curves", lambda: own_curves(own), own)
         return lie_down(coat, bed, stand, numbers, fields, own, curves, rank, sides)
 
@@ -352,7 +348,7 @@ class Plumage:
             values.evaluate(coat.density, frame, base.fields), len(bed.places.ids)
         )
         shown = rand(bed.places.ids, seed_of(coat) + 401) < density
-        return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields, base.give)
+        return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields)
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -1,8 +1,9 @@
 """Settling feathers one after another, from the lowest up, until none passes through what lies below it.
 
 Only feathers that exact tests found crossing are touched. Each is lifted a little (and bent back by as much), rolled,
-and shortened as the last resort, the smallest change first; the lift that clears is then found by halving, so that it
-follows a smooth motion smoothly. A feather may not lie on the root of one that has still to come to rest above it.
+and shortened as the last resort, the smallest change first. In a frame of an animation it is lifted by GIVE at most, so
+that it is not seen to jump, whatever comes to block it; out of the skin it is lifted as far as it must. A feather may
+not lie on the root of one that has still to come to rest above it.
 (Rotating feathers about their roots until they are clear: US7098911, expired; the order: Liu et al. 2015.)
 """
 
@@ -29,6 +30,10 @@ ROLLS = np.radians([0.0, 4.0, -4.0])
 LENGTHS = np.array([1.0, 0.87, 0.75, 0.64, 0.54, 0.45, 0.36, 0.28, 0.2, 0.1, 0.04, 0.01, 1e-3])
 BENT_BACK = 1.2  # of an added lift, taken back along the feather so that its tip does not stand out
 HALVINGS = 5
+GIVE = float(np.radians(1.35))  # moves no point of a vane by more than 1 % of its length while BENT_BACK holds
+GIVE_STEPS = 4
+SKIN_LIFT = float(np.radians(2.5))  # a step out of the skin, as many as SKIN_STEPS; then as many that shrink
+SKIN_STEPS = 12
 
 
 @njit(cache=True, nogil=True)
@@ -80,26 +85,80 @@ def _changed(base, lift, roll, length, bent_back, out):  # type: ignore[no-untyp
     out[BEND] = base[BEND] + bent_back * lift / max(out[LENGTH], 1e-30)
 
 
+@njit(cache=True, nogil=True)
+def _out_of_skin(  # type: ignore[no-untyped-def]
+    way, base, own_vane, root, frame, nodes, children, corners, bent_back, trial, vane, own, stack, s, t
+):
+    """Pose a feather `way` steps along its way out of the skin, first lifted, then shrunk; True when it is clear."""
+    shrunk = max(1.0 - max(way - SKIN_STEPS, 0.0) / SKIN_STEPS, LENGTHS[-1])
+    _changed(base, min(way, SKIN_STEPS) * SKIN_LIFT, 0.0, shrunk, bent_back, trial)
+    pose_vane(own_vane, trial, root, frame, vane)
+    strip_boxes(vane, own)
+    return not vane_meets_skin(vane, own, nodes, children, corners, stack, s, t)
+
+
+@njit(cache=True, nogil=True)
+def _follow(  # type: ignore[no-untyped-def]
+    base, own_vane, root, frame, nodes, children, corners, bent_back, vanes, boxes, lower, upper, trial, vane, own,
+    stack, s, t,
+):
+    """Pose a blocked feather for a frame of an animation, into trial, vane and own: lifted by the least up to GIVE
+    that clears it, left as it is where none does; then out of the skin by the least lift, or length, that does it."""
+    lift, last = 0.0, -3
+    for step in range(1, GIVE_STEPS + HALVINGS + 1):
+        if step <= GIVE_STEPS:
+            tried = GIVE * step / GIVE_STEPS
+        elif lift == 0.0:
+            break
+        else:
+            tried = lift - GIVE / GIVE_STEPS * 0.5 ** (step - GIVE_STEPS)
+        if step <= GIVE_STEPS and lift > 0.0:
+            continue
+        _changed(base, tried, 0.0, 1.0, bent_back, trial)
+        pose_vane(own_vane, trial, root, frame, vane)
+        strip_boxes(vane, own)
+        last = _blocked(vane, own, vanes, boxes, lower, upper, last, nodes, children, corners, stack, s, t)
+        if last == -1:
+            lift = tried
+    _changed(base, lift, 0.0, 1.0, bent_back, trial)
+    base[:] = trial
+    low = high = 0.0
+    while not _out_of_skin(
+        high, base, own_vane, root, frame, nodes, children, corners, bent_back, trial, vane, own, stack, s, t
+    ):
+        if high == 2 * SKIN_STEPS:
+            return
+        low, high = high, high + 1.0
+    if high == 0.0:
+        return
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if _out_of_skin(
+            middle, base, own_vane, root, frame, nodes, children, corners, bent_back, trial, vane, own, stack, s, t
+        ):
+            high = middle
+        else:
+            low = middle
+    _out_of_skin(high, base, own_vane, root, frame, nodes, children, corners, bent_back, trial, vane, own, stack, s, t)
+
+
 @njit(
     types.void(
         I32_1D, types.Array(types.float64, 1, "C", readonly=True), I32_1D, I32_1D,
         F32_4D, F32_2D, F32_3D, F32_2D, I32_2D, F32_2D, types.boolean, types.float64,
-        types.Array(types.float64, 1, "C", readonly=True), types.Array(types.float64, 1, "C", readonly=True),
         types.boolean[::1], types.boolean[::1], types.float64[:, ::1], types.float32[:, :, :, ::1],
         types.float32[:, :, ::1],
     ),
     cache=True, nogil=True,
 )
 def settle_rows(  # type: ignore[no-untyped-def]
-    order, rank, start, other, own_vanes, roots, frames, nodes, children, corners, may_roll, bent_back, most,
-    shortest, suspect, moved, poses, vanes, boxes
+    order, rank, start, other, own_vanes, roots, frames, nodes, children, corners, at_rest, bent_back, suspect,
+    moved, poses, vanes, boxes
 ):
     """Settle the rows of `order` (n,) int32, lowest first.
 
     bent_back : share of an added lift that is taken back by bending the feather down; 0 keeps shapes as they are.
-    may_roll : at rest; in a frame of an animation a roll would be seen as a jump.
-    most : (N,) float64, radians a feather may be lifted by. shortest : (N,) float64, the least factor on its length for
-        the sake of other feathers; to stay out of the skin it shrinks as far as it must.
+    at_rest : with as much change as it takes; False for a frame of an animation, which lifts by no more than GIVE.
     suspect : (N,) bool, found crossing (or to be looked at); moved : (N,) bool, written where a pose was changed.
     poses, vanes, boxes : as they are, written where they change.
     """
@@ -135,22 +194,22 @@ def settle_rows(  # type: ignore[no-untyped-def]
         if last == -1:
             continue
         base[:] = poses[i]
+        if not at_rest:
+            _follow(
+                base, own_vanes[i], roots[i], frames[i], nodes, children, corners, bent_back, vanes, boxes, lower,
+                upper, trial, vane, own, stack, s, t,
+            )
+            poses[i] = trial
+            vanes[i] = vane
+            boxes[i] = own
+            moved[i] = True
+            continue
         found = in_skin = False
         for a in range(len(LENGTHS)):
-            longer = LENGTHS[max(a - 1, 0)]
-            shorter = LENGTHS[a]
-            if longer > shortest[i]:
-                shorter = max(shorter, shortest[i])
-            elif a > 0:
-                if not in_skin:
-                    break
-                lower, upper = below[:0], above[:0]  # only the skin counts now
-                last = -3
+            longer, shorter = LENGTHS[max(a - 1, 0)], LENGTHS[a]
             for b in range(len(LIFTS)):
-                if b > 0 and LIFTS[b - 1] >= most[i]:
-                    break
-                lift = min(LIFTS[b], most[i])
-                for c in range(len(ROLLS) if may_roll and b % 2 == 0 else 1):
+                lift = LIFTS[b]
+                for c in range(len(ROLLS) if b % 2 == 0 else 1):
                     _changed(base, lift, ROLLS[c], shorter, bent_back, trial)
                     pose_vane(own_vanes[i], trial, roots[i], frames[i], vane)
                     strip_boxes(vane, own)
@@ -161,7 +220,7 @@ def settle_rows(  # type: ignore[no-untyped-def]
                         continue
                     found = True
                     best[:] = trial
-                    # the least that clears follows a smooth motion smoothly: of the lift, or of what is cut off
+                    # the least that clears, of the lift or of what is cut off: keys are moved smoothly, too
                     if c == 0 and (a > 0 or b > 0):
                         low, high = 0.0, 1.0
                         hit = -3
