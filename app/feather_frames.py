@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from app.report import Report
 from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
+from core.feather.attributes import column
 from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.export import instances, left_crossing, shown_rows
 from core.feather.coat.picture import coat_meshes
@@ -71,6 +72,12 @@ def worse(one: Figures, other: Figures) -> Figures:
 def coat_look(coat: FeatherCoat) -> FeatherLook:
     """The material of a coat: that of the feathers on its body."""
     return look_of(worn_values(coat, worn_preset(coat)))
+
+
+def shaft_radii(coat: FeatherCoat) -> tuple[float, float]:
+    """Radius at root and tip, in shaft lengths, of the shafts of the feathers on a coat's body."""
+    values = worn_values(coat, worn_preset(coat))
+    return float(values[column("shaftRadius")]), float(values[column("shaftRadiusTip")])
 
 
 def export_frame(

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import draw, posed_document
-from app.feather_frames import Figures, coat_look, export_frame, frame_range, say_beyond_clips, worse
+from app.feather_frames import Figures, coat_look, export_frame, frame_range, say_beyond_clips, shaft_radii, worse
 from app.report import Report, peak_megabytes
 from core.document import Document, MeshObject, with_feathers, with_groom
 from core.errors import UserError
@@ -41,6 +41,7 @@ def command(
     overlap: Annotated[float, typer.Option(min=0.1, max=50.0, help="How many rows a feather covers.")] = 3.7,
     frames: Annotated[str | None, typer.Option(help="Frames to write, as A-B; the mesh must move.")] = None,
     each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
+    curves: Annotated[bool, typer.Option("--curves", help="Write the shafts alone, as curves with widths for hair renderers.")] = False,
     unit: Annotated[str | None, typer.Option(help="Unit of the file where it does not say: m, cm, mm, in, ft.")] = None,
     up: Annotated[str | None, typer.Option(help="Up axis of the file where it does not say: y or z.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of everything random; the same seed gives the same coat.")] = 0,
@@ -67,7 +68,7 @@ def command(
             plumage.bed(dressed.coat, dressed.keys, item.mesh)
         with report.stage("layer", "laying feathers over one another"):
             rest = plumage.at_rest(dressed.coat, dressed.keys, item.mesh, float(document.first_frame))
-        found = _written(output, document, dressed, plumage, rest, wanted, each, evaluator, report)
+        found = _written(output, document, dressed, plumage, rest, wanted, each, curves, evaluator, report)
     result = {
         "keys": len(dressed.keys.guides), **found, "seconds": report.seconds, "peak_mb": peak_megabytes(),
         "outputs": [str(path) for path in output], "preset": preset, "placement": placement, "seed": seed,
@@ -101,12 +102,13 @@ def _document(path: Path, unit: str | None, up: str | None, moving: bool, report
 
 def _written(
     outputs: list[Path], document: Document, dressed: Dressed, plumage: Plumage, rest: Laid,
-    wanted: tuple[int, int] | None, each: bool, evaluator: Evaluator, report: Report,
+    wanted: tuple[int, int] | None, each: bool, curves: bool, evaluator: Evaluator, report: Report,
 ) -> Figures:
     """Write every frame to every output; the worst counts of all frames, made on what was written."""
     item = document.meshes[0]
     numbers = [document.first_frame] if wanted is None else list(range(wanted[0], wanted[1] + 1))
     figures: Figures = {}
+    each = each or curves
     with ExitStack() as stack:
         writers = []
         for path in outputs:
@@ -120,7 +122,7 @@ def _written(
             temporary = stack.enter_context(atomic_write(path))
             writers.append(FeatherWriter(
                 temporary, dressed.coat.name, item.mesh, maker(), coat_look(dressed.coat), wanted is not None,
-                document.fps))
+                document.fps, shaft_radii(dressed.coat) if curves else None))
         start = float(document.first_frame)
         added = None if wanted is None or each else added_at_rest(rest, evaluator.workers)
         for frame in numbers:

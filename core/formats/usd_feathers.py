@@ -1,10 +1,11 @@
-"""Coats of feathers as OpenUSD: rigid instances of shapes, or a mesh of every feather.
+"""Coats of feathers as OpenUSD: rigid instances of shapes, a mesh of every feather, or the curve of every shaft.
 
 What is written, under the default prim ``/Feathers`` (metres, Y up, extents authored)::
 
     /Feathers/<name>               PointInstancer: positions, orientations, scales, protoIndices, ids
     /Feathers/<name>/Prototypes    one Mesh for every quantised shape, feathers of length 1
     /Feathers/<name>               or Mesh: all feathers, with the primvar feather_id per face
+    /Feathers/<name>               or BasisCurves: their shafts, with widths and the primvar feather_id per curve
     /Feathers/mesh                 the animal, moving where it moves
     /Feathers/Looks/feather        UsdPreviewSurface and MaterialX, bound to both
 
@@ -50,11 +51,12 @@ class FeatherWriter:
     ----------
     path : .usda, .usdc or .usd. name : of the coat. mesh : the animal at rest. maker : name and version of the program.
     look : of its feathers from afar. animated : values become time samples of their frames.
+    shafts : radius of a shaft at its root and tip, in shaft lengths: feathers with vanes are written as curves.
     """
 
     def __init__(
         self, path: Path, name: str, mesh: Mesh, maker: str, look: FeatherLook, animated: bool,
-        fps: float = 24.0,
+        fps: float = 24.0, shafts: tuple[float, float] | None = None,
     ) -> None:
         from pxr import Sdf, Usd, UsdGeom
 
@@ -64,6 +66,7 @@ class FeatherWriter:
         self._layer = Sdf.Layer.CreateNew(str(path), args=made)
         self._stage = stage = Usd.Stage.Open(self._layer)
         self._animated = animated
+        self._shafts = shafts
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         root = UsdGeom.Xform.Define(stage, "/Feathers").GetPrim()
@@ -87,6 +90,8 @@ class FeatherWriter:
         self._mesh.CreateExtentAttr().Set(_extent(frame.points), time)
         if frame.instances is not None:
             self._write_instances(frame, frame.instances, time)
+        elif self._shafts is not None:
+            self._write_shafts(frame, self._shafts, time)
         else:
             self._write_meshes(frame, time)
 
@@ -128,7 +133,7 @@ class FeatherWriter:
         coat.GetPrim().SetCustomDataByKey("filoplume:quantising_error", found.error)
 
     def _write_meshes(self, frame: FeatherFrame, time: Any) -> None:
-        from pxr import Sdf, UsdGeom, UsdShade, Vt
+        from pxr import UsdGeom, UsdShade
 
         assert frame.vanes is not None  # one of the two is given
         vanes = frame.vanes
@@ -136,11 +141,37 @@ class FeatherWriter:
             self._coat = UsdGeom.Mesh.Define(self._stage, self._place)
             UsdShade.MaterialBindingAPI.Apply(self._coat.GetPrim()).Bind(self._material)
         _write_vanes(self._coat, vanes, time)
-        cells = 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1)
+        self._write_of_each(frame, 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1), time)
+
+    def _write_shafts(self, frame: FeatherFrame, radii: tuple[float, float], time: Any) -> None:
+        from pxr import UsdGeom, UsdShade, Vt
+
+        assert frame.vanes is not None  # one of the two is given
+        shafts = np.ascontiguousarray(frame.vanes[:, :, frame.vanes.shape[2] // 2])  # the middle column of a vane
+        if self._coat is None:
+            self._coat = UsdGeom.BasisCurves.Define(self._stage, self._place)
+            self._coat.CreateTypeAttr(UsdGeom.Tokens.linear)
+            self._coat.CreateWidthsAttr()
+            self._coat.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+            UsdShade.MaterialBindingAPI.Apply(self._coat.GetPrim()).Bind(self._material)
+        count, rows = shafts.shape[:2]
+        lengths = np.linalg.norm(np.diff(shafts, axis=1), axis=2).sum(axis=1)
+        widths = 2.0 * lengths[:, None] * np.linspace(*radii, rows)
+        points = shafts.reshape(-1, 3)
+        self._coat.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, rows, np.int32)), time)
+        self._coat.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), time)
+        self._coat.GetWidthsAttr().Set(Vt.FloatArray.FromNumpy(widths.reshape(-1).astype(np.float32)), time)
+        self._coat.CreateExtentAttr().Set(_extent(points, float(widths.max(initial=0.0)) / 2.0), time)
+        self._write_of_each(frame, 1, time)
+
+    def _write_of_each(self, frame: FeatherFrame, times: int, time: Any) -> None:
+        """Ids and attributes of feathers that are `times` faces or curves each."""
+        from pxr import Sdf, UsdGeom, Vt
+
         api = UsdGeom.PrimvarsAPI(self._coat)
         made = api.CreatePrimvar("feather_id", Sdf.ValueTypeNames.IntArray, UsdGeom.Tokens.uniform)
-        made.Set(Vt.IntArray.FromNumpy(np.repeat(frame.ids, cells)), time)
-        self._write_attributes(self._coat, frame, UsdGeom.Tokens.uniform, cells, time)
+        made.Set(Vt.IntArray.FromNumpy(np.repeat(frame.ids, times)), time)
+        self._write_attributes(self._coat, frame, UsdGeom.Tokens.uniform, times, time)
 
     def _write_attributes(self, prim: Any, frame: FeatherFrame, each: Any, times: int, time: Any) -> None:
         from pxr import Sdf, UsdGeom, Vt
@@ -179,12 +210,13 @@ def _write_vanes(mesh: Any, vanes: NDArray[np.float32], time: Any) -> None:
     made.Set(Vt.Vec2fArray.FromNumpy(st), at)
 
 
-def _extent(points: NDArray[np.float32]) -> Any:
+def _extent(points: NDArray[np.float32], beyond: float = 0.0) -> Any:
     from pxr import Vt
 
     if not len(points):
         return Vt.Vec3fArray.FromNumpy(np.zeros((2, 3), np.float32))
-    return Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float32))
+    ends = np.stack([points.min(axis=0) - beyond, points.max(axis=0) + beyond])
+    return Vt.Vec3fArray.FromNumpy(ends.astype(np.float32))
 
 
 def _animal(stage: Any, mesh: Mesh) -> Any:

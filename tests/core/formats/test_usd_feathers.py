@@ -8,6 +8,7 @@ from core.evaluator import Evaluator
 from core.feather.coat.dress import dress_feathers
 from core.feather.coat.export import added_at_rest, instances
 from core.feather.coat.plumage import Plumage
+from core.feather.coat.posing import LENGTH
 from core.feather.look import FeatherLook
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.value import constant
@@ -23,9 +24,9 @@ def laid():
     evaluator.close()
 
 
-def opened(path, laid, animated=False, **given):
+def opened(path, laid, animated=False, shafts=None, **given):
     rest, _, mesh = laid
-    writer = FeatherWriter(path, "plumage", mesh, "test", FeatherLook((0.3, 0.2, 0.1)), animated)
+    writer = FeatherWriter(path, "plumage", mesh, "test", FeatherLook((0.3, 0.2, 0.1)), animated, shafts=shafts)
     for frame in (1001.0, 1002.0) if animated else (1001.0,):
         writer.write(FeatherFrame(frame, rest.skin.points, **given, attributes={}))
     writer.close(*((1001.0, 1002.0) if animated else ()))
@@ -74,6 +75,23 @@ def test_every_feather_its_own_mesh_keeps_every_point_and_id(tmp_path, laid):
     ids = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("feather_id").Get())
     assert len(ids) == len(mesh.GetFaceVertexCountsAttr().Get())
     assert sorted(set(ids.tolist())) == rest.ids[rest.shown].tolist()
+
+
+def test_shafts_are_curves_from_root_to_tip_with_widths_and_ids(tmp_path, laid):
+    rest, _, _ = laid
+    ids, vanes = rest.ids[rest.shown], rest.layered.vanes[rest.shown]
+    stage = opened(tmp_path / "hair.usdc", laid, shafts=(0.01, 0.002), instances=None, ids=ids, vanes=vanes)
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Feathers/plumage"))
+    points = np.array(curves.GetPointsAttr().Get()).reshape(len(ids), -1, 3)
+    assert curves.GetCurveVertexCountsAttr().Get() == [points.shape[1]] * len(ids)
+    np.testing.assert_allclose(points[:, 0], rest.feathers.roots[rest.shown], atol=1e-6)
+    along = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    np.testing.assert_allclose(along, rest.layered.poses[rest.shown][:, LENGTH], rtol=0.02)
+    widths = np.array(curves.GetWidthsAttr().Get()).reshape(len(ids), -1)
+    np.testing.assert_allclose(widths[:, [0, -1]] / along[:, None], [[0.02, 0.004]] * len(ids), rtol=1e-5)
+    assert curves.GetWidthsInterpolation() == UsdGeom.Tokens.vertex
+    named = UsdGeom.PrimvarsAPI(curves).GetPrimvar("feather_id")
+    assert (named.GetInterpolation(), list(named.Get())) == (UsdGeom.Tokens.uniform, ids.tolist())
 
 
 def test_frames_become_time_samples(tmp_path, laid):
