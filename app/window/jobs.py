@@ -3,6 +3,9 @@
 Nothing is called across threads. A worker puts what it has to say into a queue and wakes the thread of the window by a
 queued signal of one bridge object; whoever runs on the thread of the window empties the queue. (PySide from 6.8 dies of
 callbacks that another thread lets go of; see PYSIDE-3124.)
+
+USD is loaded here, before there is any worker: it lets other threads run while the system loads it, and one that then
+loads a library of its own waits for USD, and USD for it, for ever.
 """
 
 from __future__ import annotations
@@ -14,6 +17,10 @@ from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol
 
+import pxr.Kind
+import pxr.UsdShade
+import pxr.UsdSkel
+import pxr.UsdUtils  # noqa: F401 - these bring the rest of it
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
 from shiboken6 import isValid

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -207,3 +211,16 @@ def test_the_bar_shows_what_takes_long_and_cancels_it(desk: Desk, qtbot: QtBot) 
     assert job.stopping
     assert not bar.stop.isEnabled()
     qtbot.waitUntil(bar.isHidden, timeout=200)
+
+
+def test_usd_is_loaded_before_there_is_a_worker() -> None:
+    """Loading it beside another library stops the program: every module of it that is used comes with the jobs."""
+    root = Path(__file__).resolve().parents[2]
+    sources = [path.read_text(encoding="utf-8") for room in ("app", "core") for path in (root / room).rglob("*.py")]
+    used = {name for text in sources for line in re.findall(r"from pxr import ([\w, ]+)", text)
+            for name in re.findall(r"\w+", line)}
+    assert "UsdGeom" in used
+    loaded = subprocess.run(
+        [sys.executable, "-c", "import sys, app.window.jobs; print(*sys.modules)"], cwd=root, capture_output=True,
+        text=True, check=True, timeout=60).stdout.split()
+    assert used <= {name.removeprefix("pxr.") for name in loaded}

@@ -99,7 +99,7 @@ def test_without_a_display_it_is_one_sentence(variables: dict[str, str | None], 
 def test_an_empty_window_needs_no_library_that_only_work_needs() -> None:
     code = (
         "import sys, app.window.start, app.window.main\n"
-        "late = {'scipy.fft', 'scipy.ndimage', 'scipy.optimize', 'scipy.stats', 'av', 'pxr', 'alembic', 'OpenImageIO', "
+        "late = {'scipy.fft', 'scipy.ndimage', 'scipy.optimize', 'scipy.stats', 'av', 'alembic', 'OpenImageIO', "
         "'PyOpenColorIO', 'poselib', 'trimesh', 'core.groom.children', 'core.mesh.intrinsic', 'core.match.runs'}\n"
         "print(sorted(late & set(sys.modules)))")
     done = subprocess.run(

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
@@ -84,6 +83,8 @@ def lined_up(model: Photomodel, height: float | None = None) -> Photomodel:
 
 def _camera(photo: Photo, edges: Edges, *, free: bool) -> Photo:
     """The photograph with the rotation and the focal length that its edges tell."""
+    from scipy.optimize import least_squares  # an empty window does without
+
     size = float(max(photo.width, photo.height))
     lens = lens_of(photo)
     known = float(photo.focal_px or size)
