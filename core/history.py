@@ -96,16 +96,6 @@ class History(Generic[Value]):
         if crowded:  # strokes come faster than they can be packed: memory matters more than this one's time
             self.flush()
 
-    def amend(self, document: Value) -> None:
-        """Put a value in the place of the current one, without a step; what can be undone and redone stays."""
-        with self._lock:
-            for place in (self._cursor - 1, self._cursor + 1):  # what leads here and from here is to be packed anew
-                if 0 <= place < len(self._steps) and self._steps[place].document is None:
-                    self._steps[place].document = self._rebuild(place)
-            self._steps[self._cursor].document = document
-            for step in self._steps[self._cursor : self._cursor + 2]:
-                step.change, step.packed, step.packed_bytes = None, False, 0
-
     def undo(self) -> Value:
         """Step back and return the value there (the current one when there is nothing to undo)."""
         return self.jump(max(0, self._cursor - 1))
@@ -171,14 +161,12 @@ class History(Generic[Value]):
                     return
                 place, near = far
                 older, newer = sorted((place, near))
-                step, first, after = self._steps[place], self._steps[older], self._steps[newer]
-                before, document = first.document, after.document
+                step, before, after = self._steps[place], self._steps[older].document, self._steps[newer]
+                document = after.document
             if not after.packed and before is not None and document is not None:
                 change = difference(before, document)  # outside the lock: both are immutable
                 size = change_bytes(change)
                 with self._lock:
-                    if first.document is not before or after.document is not document:
-                        continue  # amended meanwhile
                     after.change, after.packed, after.packed_bytes = change, True, size
             if not after.packed:  # cannot be, by the invariant; rather keep memory than turn for ever
                 return

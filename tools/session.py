@@ -232,22 +232,6 @@ class Session:
         if self.recording is not None and self.history.current is not before:
             self.recording.edited(name, function, args, parameters)
 
-    def amend(self, name: str, function: Callable[..., Document], /, *args: Any, **parameters: Any) -> None:
-        """As :meth:`edit`, without a step of history: for what is no work, such as which tracks are selected."""
-        self.hand.cancel()
-        self.cancel()
-        before = self.history.current
-        changed = function(before, *args, **parameters)
-        if changed is before:
-            return
-        if self._saved is before:
-            self._saved = changed
-        self.history.amend(changed)
-        self._write_journal(name)
-        self._show(changed)
-        if self.recording is not None:
-            self.recording.edited(name, function, args, parameters)
-
     def act(self, name: str, /, **params: Any) -> None:
         """Do an action to the active groom (``tools.groom.actions``) or mesh (``tools.pose.actions``), as one step.
 

@@ -166,11 +166,6 @@ class HistoryMachine(RuleBasedStateMachine):
         self.cursor += 1
         self.states[self.cursor :] = [state]
 
-    @rule(seed=st.integers(0, 99))
-    def amend(self, seed):
-        self.states[self.cursor] = stroked(self.states[self.cursor], seed, 0.3)
-        self.history.amend(self.states[self.cursor])
-
     @rule()
     def undo(self):
         self.cursor = max(0, self.cursor - 1)

@@ -112,11 +112,8 @@ class PlateEye:
         """How far the picture is moved so that a track stays where it first is."""
         track = next((t for t in self.desk.document.tracks if t.id == self.still), None)
         plate = self.plate
-        if track is None or plate is None or not len(track.frames):
+        if track is None or plate is None or track.plate_id != plate.id or not len(track.frames):
             return 0.0, 0.0
-        place = place_at(track, self.frame)
-        if place is None:
-            near = int(np.argmin(np.abs(track.frames - self.frame)))
-            place = track.points[near]
-        x, y = place - track.points[0]
+        # where the track is not seen the picture goes on evenly from one place to the next, and rests beyond them
+        x, y = (np.interp(self.frame, track.frames, along) - along[0] for along in track.points.T)
         return float(x) * plate.pixel_aspect, -float(y)

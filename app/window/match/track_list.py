@@ -32,14 +32,13 @@ from core.match.track import Track
 from core.workspace import Workspace
 from tools.match_edits import select_tracks, selected_tracks, shown_plate
 
-MOST_ROWS = 12
+MOST_ROWS = 8  # so that the curves below are in view on a small screen
 MARGIN = 3  # pixels beside the spans
 ROLE = Qt.ItemDataRole.UserRole
-HEADS = ("Track", "Frames", "Error", "Like", "Seen")
+HEADS = ("Track", "Error", "Like", "Seen")
 TO_THE_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 TIPS = (
     "Tracks of the plate, the worst first. A click selects one and goes to its worst frame.",
-    "On how many frames the track is seen.",
     "The largest error the track foretells of itself, in pixels of the plate.",
     "How like its key the pattern is on the worst frame, from 0 to 1.",
     "Where along the plate the track is seen; its keys are brighter. A click goes to that frame.",
@@ -140,7 +139,7 @@ class TrackList(QWidget):
     def _selected(self) -> None:
         if not self._filling:
             ids = tuple(int(item.data(0, ROLE)) for item in self.list.selectedItems())
-            self.desk.attempt(self.desk.session.amend, "Select tracks", select_tracks, ids)
+            self.desk.edit("Select tracks", select_tracks, ids)
 
     def _clicked(self, item: QTreeWidgetItem, place: int) -> None:
         plate = shown_plate(self.desk.document)
@@ -164,7 +163,7 @@ class TrackList(QWidget):
 
 
 class _Tracks(QTreeWidget):
-    """Rows of tracks, as high as what is in it, up to twelve."""
+    """Rows of tracks, as high as what is in it, up to eight."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -180,8 +179,9 @@ class _Tracks(QTreeWidget):
         self.setItemDelegateForColumn(len(HEADS) - 1, _Spans(self))
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         head = self.header()
-        head.setStretchLastSection(True)
+        head.setStretchLastSection(False)  # by its mode, for alone it keeps its first width beside a scroll bar
         head.setMinimumSectionSize(30)
+        head.setSectionResizeMode(len(HEADS) - 1, QHeaderView.ResizeMode.Stretch)
         for place in range(len(HEADS) - 1):
             head.setSectionResizeMode(place, QHeaderView.ResizeMode.ResizeToContents)
 
@@ -210,11 +210,13 @@ class _Tracks(QTreeWidget):
         for track in tracks:
             error, score = worst_of(track)
             state = " (locked)" if track.locked else " (hidden)" if track.hidden else ""
-            item = QTreeWidgetItem([f"{track.name}{state}", f"{len(track.frames)}", f"{error:.2f}", f"{score:.2f}"])
+            item = QTreeWidgetItem([f"{track.name}{state}", f"{error:.2f}", f"{score:.2f}"])
+            count = len(track.keys)
+            item.setToolTip(0, f"{track.name}: seen on {len(track.frames)} of {len(plate.frames)} frames, "
+                               f"{count} {'key' if count == 1 else 'keys'}. A click goes to its worst frame.")
             item.setData(0, ROLE, track.id)
             item.setData(len(HEADS) - 1, ROLE, (track, plate))
-            item.setTextAlignment(1, TO_THE_RIGHT)
-            for place, poor in ((2, error > POOR), (3, score < UNLIKE)):
+            for place, poor in ((1, error > POOR), (2, score < UNLIKE)):
                 item.setTextAlignment(place, TO_THE_RIGHT)
                 if poor:
                     item.setForeground(place, theme.colour("trouble_text"))

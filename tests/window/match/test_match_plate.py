@@ -250,16 +250,22 @@ def test_plates_are_listed_told_of_relinked_and_shown(opened: Opened, plate: Pat
     assert edits.shown_plate(desk.document).id == first.id
 
 
-def test_a_click_in_the_list_is_no_step_and_shapes_are_deleted_one_by_one(opened: Opened, plate: Path) -> None:
+def test_a_click_in_the_list_is_a_step_and_shapes_are_deleted_one_by_one(opened: Opened, plate: Path) -> None:
     hand = opened_plate(opened, plate)
     desk, tracks = hand.window.desk, hand.window.findChild(TrackList)
     made = tuple(keyed_track(n, f"t{n}", np.array([[FIRST, 50.0 + 30 * n, 60.0]])) for n in (1, 2))
     desk.edit("Tracks", edits.add_tracks, made, desk.document.plates[0].id)
-    steps = desk.session.history.names
+    before = desk.document
     row = tracks.list.visualItemRect(tracks.list.topLevelItem(0)).center()
     QTest.mouseClick(tracks.list.viewport(), LEFT, pos=row)
     assert len(desk.document.track_selection) == 1
-    assert desk.session.history.names == steps
+    assert desk.session.history.undo_name == "Select tracks"
+    chosen = desk.document.track_selection
+    hand.window.commands.run("edit.undo")
+    assert desk.document is before
+    assert len(tracks.list.selectedItems()) == 2
+    hand.window.commands.run("edit.redo")
+    assert [item.data(0, Qt.ItemDataRole.UserRole) for item in tracks.list.selectedItems()] == list(chosen)
     desk.set_workspace(frame=float(FIRST + 2))
     hand.key(Qt.Key.Key_Left)
     hand.until(lambda: desk.workspace.frame == FIRST + 1)  # the keys still go to the plate
@@ -333,6 +339,10 @@ def test_tracks_go_out_and_in_by_the_dialogs_and_a_click_on_their_span_goes_to_a
     tree = tracks.list
     tree.scrollToItem(tree.topLevelItem(0))
     middle = tree.visualItemRect(tree.topLevelItem(0)).center().y()
-    left, wide = tree.columnViewportPosition(4), tree.columnWidth(4)
+    left, wide = tree.columnViewportPosition(3), tree.columnWidth(3)
     QTest.mouseClick(tree.viewport(), LEFT, pos=QPoint(left + round(0.75 * wide), middle))
     assert desk.workspace.frame == FIRST + 7
+    more = tuple(keyed_track(n, f"t{n}", rows) for n in range(2, 22))
+    desk.edit("Tracks", edits.add_tracks, more, desk.document.plates[0].id)
+    hand.until(tree.verticalScrollBar().isVisible)
+    hand.until(lambda: tree.columnViewportPosition(3) + tree.columnWidth(3) == tree.viewport().width())
