@@ -226,10 +226,12 @@ class _Tracks(QTreeWidget):
         self.updateGeometry()
 
     def choose(self, chosen: tuple[int, ...]) -> None:
-        """Show these tracks as selected."""
+        """Show these tracks as selected, and bring the active one, the last, into view; under the hand rows stay."""
         for row in range(self.topLevelItemCount()):
             item = self.topLevelItem(row)
             item.setSelected(item.data(0, ROLE) in chosen)
+            if chosen and item.data(0, ROLE) == chosen[-1] and not self.underMouse():
+                self.scrollToItem(item)
 
 
 class _Spans(QStyledItemDelegate):

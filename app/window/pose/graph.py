@@ -97,8 +97,9 @@ class Graph(QWidget):
             painter.setPen(theme.colour("line"))
             painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
             painter.setPen(theme.colour("dim"))
+            words = f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
             painter.drawText(QRectF(0, y - 8, area.left() - 4, 16),
-                             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, f"{value:.2g}")
+                             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, words)
         below = QRectF(area.left(), area.bottom() + 2, area.width(), look.small + 5)
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft, f"{round(low_x, 1):g}")
         painter.drawText(below, Qt.AlignmentFlag.AlignRight, f"{round(high_x, 1):g}")

@@ -22,6 +22,7 @@ from tools.document_edits import set_document
 from tools.frames import clip_range
 
 STEPS = (1, 2, 5)  # times a power of ten: frames between two numbers of the ruler
+LATE = 0.9  # of the rate: below it is said how many frames are shown
 WHEEL = 120  # an eighth of a degree each: one notch
 
 
@@ -260,6 +261,7 @@ class Timeline(QWidget):
         self.curves = IconButton("curve", "Shows or hides the curves of keyed values over the timeline.")
         line.addWidget(self.curves)
         self.playback.changed.connect(lambda: self.play.set_icon("pause" if self.playback.playing else "play"))
+        self.playback.changed.connect(self._tell_rate)
         desk.changed.connect(self._changed)
         desk.workspace_changed.connect(self._workspace_changed)
         desk.stroke_ended.connect(self.refresh)
@@ -297,6 +299,13 @@ class Timeline(QWidget):
         if old.frame != new.frame:
             self.frame.show_number(new.frame)
             self.ruler.update()
+            self._tell_rate()
+
+    def _tell_rate(self) -> None:
+        """While it plays and frames are left out, how many a second are shown stands beside the rate."""
+        shown = self.playback.reached
+        late = self.playback.playing and 0.0 < shown < LATE * self._desk.document.fps
+        self._unit.setText(f"fps, {shown:.0f} shown" if late else "fps")
 
     def _go(self, frame: float) -> None:
         self._desk.set_workspace(frame=float(frame))

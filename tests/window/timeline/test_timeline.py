@@ -204,6 +204,20 @@ def test_playback_shows_the_frame_whose_time_it_is(desk: Desk, qtbot: QtBot) -> 
     assert not playback.playing
 
 
+def test_frames_left_out_are_said_beside_the_rate(
+    desk: Desk, timeline: Timeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, playback = Clock(), timeline.playback
+    monkeypatch.setattr(playback, "_clock", clock)
+    playback.play()
+    for frames, said in ((1, "fps"), (4, "fps, 20 shown"), (4, "fps, 18 shown")):
+        clock.now += frames / 24
+        playback.tick()
+        assert timeline._unit.text() == said
+    playback.pause()
+    assert timeline._unit.text() == "fps"
+
+
 def test_playback_waits_for_a_stroke(desk: Desk, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> None:
     clock = Clock()
     playback = Playback(desk, clock=clock)
