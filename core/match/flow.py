@@ -1,11 +1,11 @@
 """Optical flow between two frames as a spline (Szeliski & Coughlan, "Spline-based image registration", IJCV 22, 1997).
 
 The displacement is a cubic B-spline over a control grid, so it is smooth where the motion is and there are no windows
-that overlap. It is found coarse to fine with Gauss-Newton (conjugate gradients on the grid, matrix-free), begun by
-dense inverse search (Kroeger et al., "Fast optical flow using dense inverse search", ECCV 2016, by OpenCV). The grid is
-subdivided only where it earns it: where the coarse spline explains the frames worse than the search did, or leaves the
-search far without explaining them better. What not even the finest grid can follow, an edge of the motion, stays as
-the search found it.
+that overlap. It is found coarse to fine with a step of Gauss-Newton on each grid (conjugate gradients, matrix-free),
+begun by dense inverse search (Kroeger et al., "Fast optical flow using dense inverse search", ECCV 2016, by OpenCV).
+The grid is subdivided only where it earns it: where the coarse spline explains the frames worse than the search did, or
+leaves the search far without explaining them better. What not even the finest grid can follow, an edge of the motion,
+stays as the search found it.
 
 Every pixel has a covariance: from the normal equations of the coarsest grid, from how far the search back from the
 second frame misses it, and from how much the frames still differ there.
@@ -21,7 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.image.mix import even_grey
-from core.match.flow_kernels import data_term, gather, normal_product, spread
+from core.match.flow_kernels import (
+    aim,
+    data_term,
+    gather,
+    mixed_covariance,
+    normal_product,
+    overlaps,
+    smaller_gap,
+    spread,
+)
 from core.workers import serial_ranges
 
 Field = NDArray[np.float32]
@@ -29,7 +38,7 @@ Ranges = Callable[[int, Callable[[int, int], object], int], None]
 LEVELS = ((4, 1.2), (2, 1.0), (1, 0.5))  # spacing over the finest; pixels of the Gauss before the frames are compared
 BIAS = 15  # pixels: side of the window whose mean difference is light, not motion
 STIFFNESS = 0.02  # of the strength of the data: keeps the grid still where there is nothing to see
-SWEEPS = 6  # of conjugate gradients in a step of Gauss-Newton
+SWEEPS = 5  # of conjugate gradients in a step of Gauss-Newton
 LEAST_SIDE = 32
 MOST = np.float32(4.0)  # pixels in one step
 LEAST_GREY = 0.001  # of the range of grey: by so much the spline may explain worse than the search
@@ -58,41 +67,39 @@ def flow_between(
     second: Field,
     *,
     spacing: int = 8,
-    rounds: int = 2,
     cancel: Callable[[], bool] | None = None,
     ranges: Ranges = serial_ranges,
 ) -> Flow:
     """Flow from `first` to `second`, both (H, W, C) float32 of one size.
 
-    spacing : pixels between vertices of the finest grid. rounds : steps of Gauss-Newton on every level.
+    spacing : pixels between vertices of the finest grid.
     """
     if first.shape != second.shape:
         raise ValueError("flow needs two frames of one size")
     start, backs = search_flow(first, second, spacing, ranges)
     a, b = even_grey(first, second)
-    y, x = np.mgrid[0 : a.shape[0], 0 : a.shape[1]]
-    places = np.stack((x, y), axis=2).astype(np.float32)
-    left = _disagreement(a, b, start, places)
+    left = _disagreement(a, b, start)
     flow = fitted(start, LEVELS[0][0] * spacing, ranges)
     covariance = np.zeros((*a.shape, 3), np.float32)
     torn = np.ones(a.shape, np.float32)  # where the grid of the level is needed
+    room = np.empty((7, *a.shape), np.float32)
     for level, (times, sigma) in enumerate(LEVELS):
         step = times * spacing
         if level:
-            torn = _torn(a, b, flow, start, left, places)
+            torn = _torn(a, b, flow, start, left)
             flow = flow + fitted(_soft(torn, 5) * (start - flow), step, ranges)
         active = (_onto(torn, step) > LEAST_SHARE * step * step).astype(np.float32)
         if not active.any() or (cancel is not None and cancel()):
             break
         ga, gb = (np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.float32) for image in (a, b))
-        for _ in range(rounds):
-            seen = _compared(ga, gb, flow, places)
-            flow = flow + _step(seen, step, active, ranges)
+        seen = _compared(ga, gb, flow, room)
+        flow = flow + _step(seen, step, active, ranges)
         if not level:
             covariance = _covariance(seen, step, ranges)
-    flow = flow + _soft(_torn(a, b, flow, start, left, places), 3) * (start - flow)
-    apart = ALIKE + APART * _disagreement(a, b, flow, places)
-    return Flow(flow, NOTHING * covariance + apart[:, :, None] * _missed(flow, start, backs, places))
+    flow = flow + _soft(_torn(a, b, flow, start, left), 3) * (start - flow)
+    apart = ALIKE + APART * _disagreement(a, b, flow)
+    _add_missed(covariance, flow, start, backs, apart)
+    return Flow(flow, covariance)
 
 
 def search_flow(
@@ -112,8 +119,8 @@ def search_flow(
             search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
             search.setFinestScale(0)
             search.setPatchStride((4, 5)[n])
-            search.setGradientDescentIterations(12)
-            search.setVariationalRefinementIterations((4, 2)[n])
+            search.setGradientDescentIterations((12, 10)[n])
+            search.setVariationalRefinementIterations((3, 2)[n])
             found[n] = np.asarray(search.calc(grey[n], grey[1 - n], found[n]), np.float32)
             if n:  # here, beside the longer search
                 found[2:] = [fitted(found[n], step) for step in (spacing, 2 * spacing)]
@@ -122,9 +129,10 @@ def search_flow(
     return found[0], (found[2], found[3])
 
 
-def _warped(image: Field, flow: Field, places: Field, how: int) -> Field:
-    """The second frame brought back by a flow; `places` (H, W, 2) are those of the pixels."""
-    x, y = cv2.split(flow + places)
+def _warped(image: Field, flow: Field, how: int) -> Field:
+    """The second frame brought back by a flow."""
+    x, y = np.empty((2, *flow.shape[:2]), np.float32)
+    aim(flow, x, y)
     return np.asarray(cv2.remap(image, x, y, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
@@ -133,15 +141,15 @@ def _unlit(difference: Field) -> Field:
     return difference - np.asarray(cv2.blur(difference, (BIAS, BIAS)), np.float32)
 
 
-def _disagreement(first: Field, second: Field, flow: Field, places: Field) -> Field:
+def _disagreement(first: Field, second: Field, flow: Field) -> Field:
     """How much the frames differ around every pixel when the second is brought back by the flow."""
-    difference = _warped(second, flow, places, cv2.INTER_LINEAR) - first
+    difference = _warped(second, flow, cv2.INTER_LINEAR) - first
     return np.asarray(cv2.blur(np.abs(_unlit(difference)), (WINDOW, WINDOW)))
 
 
-def _torn(first: Field, second: Field, flow: Field, start: Field, left: Field, places: Field) -> Field:
+def _torn(first: Field, second: Field, flow: Field, start: Field, left: Field) -> Field:
     """1 where a flow is not believed against the search, which left the disagreement `left`, else 0."""
-    here = _disagreement(first, second, flow, places)
+    here = _disagreement(first, second, flow)
     away = cv2.magnitude(*cv2.split(flow - start))
     torn = (here > left + LEAST_GREY) | ((away > FAR) & (here > BETTER * left))
     return np.asarray(cv2.dilate(torn.astype(np.float32), np.ones((3, 3), np.uint8)))
@@ -151,34 +159,43 @@ def _soft(area: Field, side: int) -> Field:
     return np.asarray(cv2.blur(area, (side, side)), np.float32)[:, :, None]
 
 
-def _missed(flow: Field, start: Field, backs: tuple[Field, Field], places: Field) -> Field:
-    """Covariance (H, W, 3) of what the searches say against the flow.
+def _add_missed(covariance: Field, flow: Field, start: Field, backs: tuple[Field, Field], apart: Field) -> None:
+    """`covariance` (H, W, 3) with what the searches say against the flow, as far as the frames are `apart` there.
 
     backs : the search back, smoothed less and more. The smaller gap counts: noise makes the one large, an edge of the
     motion the other. Of the search there only a common lean over a wide window does; its noise is no error of the flow.
     """
-    fine, coarse = (flow + _warped(back, flow, places, cv2.INTER_LINEAR) for back in backs)
-    gap = np.where((cv2.magnitude(*cv2.split(fine)) < cv2.magnitude(*cv2.split(coarse)))[:, :, None], fine, coarse)
+    fine, coarse = (_warped(back, flow, cv2.INTER_LINEAR) for back in backs)
+    gap = np.empty_like(covariance)
+    smaller_gap(flow, fine, coarse, gap)
     lean = np.asarray(cv2.blur(flow - start, (WIDE, WIDE)), np.float32)
-    return np.asarray(cv2.blur(_outer(gap), (NEAR, NEAR)) + _outer(lean), np.float32)
-
-
-def _outer(field: Field) -> Field:
-    u, v = field[:, :, 0], field[:, :, 1]
-    return np.stack((u * u, u * v, v * v), axis=2)
+    mixed_covariance(np.asarray(cv2.blur(gap, (NEAR, NEAR)), np.float32), lean, apart, NOTHING, covariance)
 
 
 def fitted(field: Field, step: int, ranges: Ranges = serial_ranges) -> Field:
-    """The smooth spline near a field (H, W, 2): averaged onto the grid with its own weights, corrected thrice."""
+    """The smooth spline near a field (H, W, 2): averaged onto the grid with its own weights, corrected thrice.
+
+    A correction stays on the grid: a spline at all pixels and put back onto the grid is two products with bands.
+    """
     shape = field.shape[:2]
-    weight = np.maximum(_onto(np.ones(shape, np.float32), step), np.float32(1e-6))
-    grids = np.zeros((2, *weight.shape), np.float32)
-    made = np.zeros_like(field)
-    for _ in range(4):
-        rest = field - made
-        grids += _onto_all([np.ascontiguousarray(rest[:, :, c]) for c in range(2)], step, ranges) / weight
-        made = _pixels(grids, step, shape, ranges)
-    return made
+    down, across = (np.empty(((side - 1) // step + 4, 7), np.float32) for side in shape)
+    for side, bands in zip(shape, (down, across), strict=True):
+        overlaps(side, step, bands)
+    ones = np.ones((1, len(down), len(across)), np.float32)  # a spline that is 1 everywhere
+    weight = np.maximum(_banded(ones, down, across), np.float32(1e-6))
+    sums = _onto_all([np.asarray(part, np.float32) for part in cv2.split(field)], step, ranges)
+    grids = sums / weight
+    for _ in range(3):
+        grids += (sums - _banded(grids, down, across)) / weight
+    return _pixels(grids, step, shape, ranges)
+
+
+def _banded(grids: Field, down: Field, across: Field) -> Field:
+    """Grids (K, rows, columns) times the bands (vertices, 7) of their columns and of their rows."""
+    rows, columns = grids.shape[1:]
+    wide = np.pad(grids, ((0, 0), (3, 3), (3, 3)))
+    tall = sum(across[:, k] * wide[:, :, k : k + columns] for k in range(7))
+    return np.asarray(sum(down[:, k, None] * tall[:, k : k + rows] for k in range(7)), np.float32)
 
 
 class _Compared(NamedTuple):
@@ -197,20 +214,16 @@ class _Compared(NamedTuple):
     noise: float
 
 
-def _compared(first: Field, second: Field, flow: Field, places: Field) -> _Compared:
-    height, width = first.shape
-    x, y = cv2.split(flow + places)
-    inside = ((x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)).astype(np.float32)
-    warped = _warped(second, flow, places, cv2.INTER_CUBIC)
-    both = 0.5 * (warped + first)
-    gx = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 32.0)))
-    gy = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 32.0)))
+def _compared(first: Field, second: Field, flow: Field, room: Field) -> _Compared:
+    """What the frames say about `flow`, written into `room` (7, H, W)."""
+    warped = _warped(second, flow, cv2.INTER_CUBIC)
+    both = cv2.add(warped, first)
+    gx = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 64.0)))
+    gy = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 64.0)))
     rest = _unlit(warped - first)
-    some = rest[::3, ::3][inside[::3, ::3] > 0]
-    noise = 1.4826 * float(np.median(np.abs(some))) + 1e-6 if len(some) else 1.0
-    xx, xy, yy, bx, by, square = (np.empty((height, width), np.float32) for _ in range(6))
-    data_term(rest, inside, gx, gy, noise, xx, xy, yy, bx, by, square)
-    return _Compared(xx, xy, yy, bx, by, square, inside, noise)
+    noise = 1.4826 * float(np.median(np.abs(rest[::3, ::3]))) + 1e-6
+    data_term(rest, flow, gx, gy, noise, *room)
+    return _Compared(*room, noise)
 
 
 def _step(seen: _Compared, step: int, active: Field, ranges: Ranges) -> Field:

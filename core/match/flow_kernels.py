@@ -8,6 +8,7 @@ from numba import njit, types
 f32, i64 = types.float32, types.int64
 F32_2D = types.Array(types.float32, 2, "C", readonly=True)
 W_F32_2D = f32[:, ::1]
+W_F32_3D = f32[:, :, ::1]
 BOOL_2D = types.Array(types.boolean, 2, "C", readonly=True)
 F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # sums in any order, but what is not a number stays so
@@ -74,7 +75,7 @@ def gather(field, step, power, out):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    types.void(F32_3D, BOOL_2D, F32_2D, F32_2D, F32_2D, i64, i64, i64, f32[:, :, ::1]),
+    types.void(F32_3D, BOOL_2D, F32_2D, F32_2D, F32_2D, i64, i64, i64, W_F32_3D),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
 def normal_product(grid, busy, xx, xy, yy, step, first, stop, out):  # type: ignore[no-untyped-def]
@@ -135,22 +136,72 @@ def normal_product(grid, busy, xx, xy, yy, step, first, stop, out):  # type: ign
 
 
 @njit(
-    types.void(F32_2D, F32_2D, F32_2D, F32_2D, f32, *([W_F32_2D] * 6)),
+    types.void(F32_2D, F32_3D, F32_2D, F32_2D, f32, *([W_F32_2D] * 7)),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
-def data_term(rest, inside, gx, gy, scale, xx, xy, yy, bx, by, square):  # type: ignore[no-untyped-def]
+def data_term(rest, flow, gx, gy, scale, xx, xy, yy, bx, by, square, inside):  # type: ignore[no-untyped-def]
     """Gauss-Newton's tensors and right side per pixel for the residuals `rest`, with Geman & McClure's weights.
 
-    square : becomes the squared residual, 0 outside.
+    inside : becomes 1 where the flow ends in the frame, else 0. square : the squared residual, 0 outside.
     """
     height, width = rest.shape
-    limit = 1.0 / (9.0 * scale * scale)
+    limit = np.float32(1.0) / (np.float32(9.0) * scale * scale)
+    right, bottom = np.float32(width - 1), np.float32(height - 1)
     for y in range(height):
         for x in range(width):
             r = rest[y, x]
-            w = 1.0 / (1.0 + r * r * limit)
-            w = w * w * inside[y, x]
+            tx, ty = flow[y, x, 0] + np.float32(x), flow[y, x, 1] + np.float32(y)
+            seen = np.float32(1.0) if tx >= 0.0 and tx <= right and ty >= 0.0 and ty <= bottom else np.float32(0.0)
+            w = np.float32(1.0) / (np.float32(1.0) + r * r * limit)
+            w = w * w * seen
             u, v = gx[y, x], gy[y, x]
-            xx[y, x], xy[y, x], yy[y, x] = w * u * u, w * u * v, w * v * v
-            bx[y, x], by[y, x] = -w * u * r, -w * v * r
-            square[y, x] = r * r * inside[y, x]
+            wu, wv = w * u, w * v
+            xx[y, x], xy[y, x], yy[y, x] = wu * u, wu * v, wv * v
+            bx[y, x], by[y, x] = -wu * r, -wv * r
+            square[y, x] = r * r * seen
+            inside[y, x] = seen
+
+
+@njit(types.void(F32_3D, W_F32_2D, W_F32_2D), cache=True, nogil=True, error_model="numpy")
+def aim(flow, x, y):  # type: ignore[no-untyped-def]
+    """Where in the second frame the pixels of the first are by a flow."""
+    for row in range(flow.shape[0]):
+        for column in range(flow.shape[1]):
+            x[row, column] = flow[row, column, 0] + np.float32(column)
+            y[row, column] = flow[row, column, 1] + np.float32(row)
+
+
+@njit(types.void(F32_3D, F32_3D, F32_3D, W_F32_3D), cache=True, nogil=True, error_model="numpy")
+def smaller_gap(flow, fine, coarse, out):  # type: ignore[no-untyped-def]
+    """Outer products (H, W, 3: xx, xy, yy) of the smaller of the gaps there and back, by either of two ways back."""
+    for y in range(flow.shape[0]):
+        for x in range(flow.shape[1]):
+            u, v = flow[y, x, 0] + fine[y, x, 0], flow[y, x, 1] + fine[y, x, 1]
+            p, q = flow[y, x, 0] + coarse[y, x, 0], flow[y, x, 1] + coarse[y, x, 1]
+            if u * u + v * v >= p * p + q * q:
+                u, v = p, q
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = u * u, u * v, v * v
+
+
+@njit(types.void(F32_3D, F32_3D, F32_2D, f32, W_F32_3D), cache=True, nogil=True, error_model="numpy")
+def mixed_covariance(gap, lean, apart, share, out):  # type: ignore[no-untyped-def]
+    """`out` (H, W, 3) becomes its `share`, and `apart` times what `gap` and the outer product of `lean` say."""
+    for y in range(gap.shape[0]):
+        for x in range(gap.shape[1]):
+            u, v, a = lean[y, x, 0], lean[y, x, 1], apart[y, x]
+            out[y, x, 0] = share * out[y, x, 0] + a * (gap[y, x, 0] + u * u)
+            out[y, x, 1] = share * out[y, x, 1] + a * (gap[y, x, 1] + u * v)
+            out[y, x, 2] = share * out[y, x, 2] + a * (gap[y, x, 2] + v * v)
+
+
+@njit(types.void(i64, i64, W_F32_2D), cache=True, nogil=True, error_model="numpy")
+def overlaps(side, step, out):  # type: ignore[no-untyped-def]
+    """Of a line of `side` pixels: `out` (vertices, 7) becomes the products of the splines of a vertex and of the
+    vertices from three before it to three behind, summed over the pixels."""
+    table = _table(step)
+    out[:] = 0.0
+    for x in range(side):
+        i = x // step
+        for p in range(4):
+            for q in range(4):
+                out[i + p, q - p + 3] += table[x - i * step, p] * table[x - i * step, q]

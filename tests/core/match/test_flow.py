@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from core.match.flow import fitted, flow_between
-from core.match.flow_kernels import gather, normal_product, spread
+from core.match.flow_kernels import data_term, gather, mixed_covariance, normal_product, overlaps, smaller_gap, spread
 from core.workers import Workers
 from tests.core.match.plates import texture
 
@@ -113,6 +113,51 @@ def test_cells_that_no_free_vertex_reaches_add_nothing_to_the_normal_equations()
     for half, (first, stop) in zip(halves, ((0, 7), (7, 15)), strict=True):
         normal_product(grid, busy, xx, xy, yy, 8, first, stop, half)
     np.testing.assert_allclose(halves[0] + halves[1], expected, atol=1e-3)
+
+
+@pytest.mark.parametrize(("side", "step"), [(120, 8), (33, 16), (5, 32)])
+def test_overlaps_of_splines_are_a_spline_put_back_onto_its_grid(side, step):
+    """Also in the vertices that only a part of the line reaches."""
+    count = (side - 1) // step + 4
+    bands = np.empty((count, 7), np.float32)
+    overlaps(side, step, bands)
+    matrix = np.zeros((count, count + 6))
+    for i, band in enumerate(bands):
+        matrix[i, i : i + 7] = band
+    for i in range(count):
+        one, line, back = np.zeros((4, count), np.float32), np.empty((1, side), np.float32), np.empty((4, count), "f4")
+        one[:, i] = 1.0
+        spread(one, step, line)
+        gather(line, step, 1, back)
+        np.testing.assert_allclose(matrix[i, 3:-3], back.sum(axis=0), atol=1e-4)  # the weights of rows are together 1
+
+
+def test_the_smaller_gap_there_and_back_counts_with_the_common_lean():
+    flow, fine, coarse = (np.full((1, 2, 2), value, np.float32) for value in (1.0, -4.0, -1.5))
+    fine[0, 1] = (-1.0, -3.0)  # 2 px off, the other way back 0.7
+    coarse[0, 1] = (4.0, 4.0)
+    gap = np.empty((1, 2, 3), np.float32)
+    smaller_gap(flow, fine, coarse, gap)
+    np.testing.assert_allclose(gap[0], [[0.25, 0.25, 0.25], [0.0, 0.0, 4.0]])
+    made = np.full((1, 2, 3), 10.0, np.float32)
+    lean = np.float32([[[1.0, 2.0], [0.0, 0.0]]])
+    mixed_covariance(gap, lean, np.float32([[2.0, 3.0]]), np.float32(0.1), made)
+    np.testing.assert_allclose(made[0], [[3.5, 5.5, 9.5], [1.0, 1.0, 13.0]], rtol=1e-6)
+
+
+def test_pixels_that_end_outside_the_frame_say_nothing():
+    flow = np.zeros((3, 4, 2), np.float32)
+    flow[1, 0, 0], flow[1, 3, 0], flow[0, 1, 1], flow[2, 1, 1], flow[2, 2, 0] = -0.5, 0.5, -1.0, 1.0, 1.0
+    gone = np.zeros((3, 4), bool)
+    gone[1, 0] = gone[1, 3] = gone[0, 1] = gone[2, 1] = True
+    rest, gx, gy = (np.full((3, 4), value, np.float32) for value in (0.3, 2.0, -1.0))
+    xx, xy, yy, bx, by, square, inside = out = np.empty((7, 3, 4), np.float32)
+    data_term(rest, flow, gx, gy, np.float32(0.1), *out)
+    np.testing.assert_array_equal(inside, ~gone)
+    assert (out[:, gone] == 0.0).all()
+    for part, expected in zip((xx, xy, yy, bx, by), (1.0, -0.5, 0.25, -0.15, 0.075), strict=True):
+        np.testing.assert_allclose(part[~gone], expected, rtol=1e-5)  # residual at three sigma: a quarter of the weight
+    np.testing.assert_allclose(square[~gone], 0.09, rtol=1e-5)
 
 
 def test_flow_is_read_by_another_library(tmp_path):
