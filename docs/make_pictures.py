@@ -33,6 +33,7 @@ from tests.display import ensure_display
 
 PICTURES = Path(__file__).parent / "pictures"
 CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's meshes, CC BY 4.0
+TUM = Path("matchmove/rgbd_tum_slambook_A/ch5/rgbd/color")  # slambook (Xiang Gao, MIT), after TUM
 # the chapter made of its steps stands between
 FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"
 FIRST_TRACK = "<!-- first track -->\n", "\n<!-- end of first track -->"
@@ -126,8 +127,8 @@ def pictures_of_steps(steps: Sequence[Any], size: tuple[int, int], picture_of: C
         hand.window.close_unasked()
 
 
-def match_window(plate: Path) -> None:
-    """A plate in the window with automatic tracks, one of them selected."""
+def match_window(plate: Path, name: str) -> None:
+    """A plate in the window with automatic tracks, one of those that go farthest selected."""
     ensure_display()  # before anything of Qt is made
     from app.window.screenshot import window_image
     from tests.window.alone import hand_at
@@ -143,12 +144,14 @@ def match_window(plate: Path) -> None:
         hand.finish()
         hand.window.commands.run("match.features")
         hand.until(lambda: not desk.jobs.running, 240_000)
-        desk.set_workspace(frame=float(desk.document.first_frame + 2))
-        far = max(desk.document.tracks, key=lambda t: float(np.abs(t.points[-1] - t.points[0]).max()))
+        frame = desk.document.first_frame + 2
+        desk.set_workspace(frame=float(frame))
+        seen = [t for t in desk.document.tracks if frame in t.frames and frame not in t.keys[:, 0]]
+        far = max(seen, key=lambda t: float(np.abs(t.points[-1] - t.points[0]).max()))
         desk.edit("Select tracks", select_tracks, (far.id,))
         hand.finish()
         image = reduced(window_image(hand.window), 0.75)
-        cv2.imwrite(str(PICTURES / "match-window.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        cv2.imwrite(str(PICTURES / name), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
         hand.window.close_unasked()
 
 
@@ -198,7 +201,8 @@ def main() -> None:
         return
     from docs.first_track import SINTEL
 
-    match_window(Path(data) / SINTEL)
+    match_window(Path(data) / SINTEL, "match-window.jpg")
+    match_window(Path(data) / TUM, "match-tum.jpg")
     first_track()
     mesh = read_mesh(Path(data) / CAT, unit="m", up="y").mesh
     made = []

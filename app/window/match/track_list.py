@@ -168,6 +168,7 @@ class _Tracks(QTreeWidget):
     def __init__(self) -> None:
         super().__init__()
         self._pressed = 0.0
+        self._chosen: tuple[int, ...] = ()
         self.setRootIsDecorated(False)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setUniformRowHeights(True)
@@ -222,15 +223,17 @@ class _Tracks(QTreeWidget):
                     item.setForeground(place, theme.colour("trouble_text"))
             items.append(item)
         self.addTopLevelItems(items)
+        self._chosen = chosen  # the worst stay in view, wherever the active one stands
         self.choose(chosen)
         self.updateGeometry()
 
     def choose(self, chosen: tuple[int, ...]) -> None:
-        """Show these tracks as selected, and bring the active one, the last, into view; under the hand rows stay."""
+        """Show these tracks as selected; a new active one, the last, is brought into view, never under the hand."""
+        another, self._chosen = chosen != self._chosen and not self.underMouse(), chosen
         for row in range(self.topLevelItemCount()):
             item = self.topLevelItem(row)
             item.setSelected(item.data(0, ROLE) in chosen)
-            if chosen and item.data(0, ROLE) == chosen[-1] and not self.underMouse():
+            if another and chosen and item.data(0, ROLE) == chosen[-1]:
                 self.scrollToItem(item)
 
 

@@ -346,3 +346,10 @@ def test_tracks_go_out_and_in_by_the_dialogs_and_a_click_on_their_span_goes_to_a
     desk.edit("Tracks", edits.add_tracks, more, desk.document.plates[0].id)
     hand.until(tree.verticalScrollBar().isVisible)
     hand.until(lambda: tree.columnViewportPosition(3) + tree.columnWidth(3) == tree.viewport().width())
+    QTest.mouseMove(hand.view, hand.at((0.5, 0.5)))
+    top, last = tree.topLevelItem(0), tree.topLevelItem(tree.topLevelItemCount() - 1)
+    area = tree.viewport().rect()
+    assert area.contains(tree.visualItemRect(top))
+    assert not area.intersects(tree.visualItemRect(last))
+    desk.edit("Select tracks", edits.select_tracks, (last.data(0, Qt.ItemDataRole.UserRole),))
+    assert area.intersects(tree.visualItemRect(last)), "the active track is brought into view"
