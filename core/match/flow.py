@@ -184,7 +184,7 @@ def fitted(field: Field, step: int, ranges: Ranges = serial_ranges) -> Field:
     ones = np.ones((1, len(down), len(across)), np.float32)  # a spline that is 1 everywhere
     weight = np.maximum(_banded(ones, down, across), np.float32(1e-6))
     sums = _onto_all([np.asarray(part, np.float32) for part in cv2.split(field)], step, ranges)
-    grids = sums / weight
+    grids = np.asarray(sums / weight, np.float32)
     for _ in range(3):
         grids += (sums - _banded(grids, down, across)) / weight
     return _pixels(grids, step, shape, ranges)
@@ -194,8 +194,12 @@ def _banded(grids: Field, down: Field, across: Field) -> Field:
     """Grids (K, rows, columns) times the bands (vertices, 7) of their columns and of their rows."""
     rows, columns = grids.shape[1:]
     wide = np.pad(grids, ((0, 0), (3, 3), (3, 3)))
-    tall = sum(across[:, k] * wide[:, :, k : k + columns] for k in range(7))
-    return np.asarray(sum(down[:, k, None] * tall[:, k : k + rows] for k in range(7)), np.float32)
+    tall, out = np.zeros((len(grids), rows + 6, columns), np.float32), np.zeros_like(grids)
+    for k in range(7):
+        tall += across[:, k] * wide[:, :, k : k + columns]
+    for k in range(7):
+        out += down[:, k, None] * tall[:, k : k + rows]
+    return out
 
 
 class _Compared(NamedTuple):
@@ -222,8 +226,9 @@ def _compared(first: Field, second: Field, flow: Field, room: Field) -> _Compare
     gy = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 64.0)))
     rest = _unlit(warped - first)
     noise = 1.4826 * float(np.median(np.abs(rest[::3, ::3]))) + 1e-6
-    data_term(rest, flow, gx, gy, noise, *room)
-    return _Compared(*room, noise)
+    xx, xy, yy, bx, by, square, inside = room
+    data_term(rest, flow, gx, gy, noise, xx, xy, yy, bx, by, square, inside)
+    return _Compared(xx, xy, yy, bx, by, square, inside, noise)
 
 
 def _step(seen: _Compared, step: int, active: Field, ranges: Ranges) -> Field:
