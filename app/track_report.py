@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.page import STYLE, Read, bytes_of, picture_data
 from core.image.plate import Plate
-from core.match.track import Track, TrackSettings
+from core.match.track import Track, TrackSettings, badness_of, errors_of
 
 MOST_TRACKS = 200
 WIDE, HIGH = 260, 48
@@ -20,7 +20,7 @@ WIDE, HIGH = 260, 48
 def write_report(
     path: Path, plate: Plate, tracks: tuple[Track, ...], settings: TrackSettings, read: Read, warnings: list[str]
 ) -> None:
-    """Write the page; tracks come worst first, by the greatest standard deviation a frame of theirs has."""
+    """Write the page; tracks come worst first, as in the window (:func:`badness_of`)."""
     order = sorted(tracks, key=_worst, reverse=True)
     shown = order[:MOST_TRACKS]
     frames = sorted({int(f) for track in shown for f in (track.keys[0, 0], track.frames[-1])} & set(plate.frames))
@@ -46,17 +46,13 @@ a standard deviation of 0.5 px and more.</p>
     path.write_text(page, encoding="utf-8")
 
 
-def _deviation(track: Track) -> NDArray[np.float64]:
-    return np.sqrt(np.maximum((track.covariance[:, 0] + track.covariance[:, 2]) / 2.0, 0.0))
-
-
 def _worst(track: Track) -> float:
-    return float(_deviation(track).max(initial=0.0))
+    return float(badness_of(track).max(initial=0.0))
 
 
 def _row(track: Track, span: range, patterns: dict[tuple[int, int], str]) -> str:
-    deviation = _deviation(track)
-    k = int(np.argmax(deviation))
+    deviation = errors_of(track)
+    k = int(np.argmax(badness_of(track)))
     moved = track.points - track.points[0]
     ends = (int(track.keys[0, 0]), int(track.frames[-1]))
     pictures = "".join(
@@ -64,7 +60,8 @@ def _row(track: Track, span: range, patterns: dict[tuple[int, int], str]) -> str
     )
     return (
         f"<tr><td>{escape(track.name)}<td class=n>{track.frames[0]}&ndash;{track.frames[-1]}"
-        f"<td class=n>{deviation[k]:.3f} px<br>frame {track.frames[k]}<td><div class=pics>{pictures}</div>"
+        f"<td class=n>{deviation[k]:.3f} px, score {track.score[k]:.2f}"
+        f"<br>frame {track.frames[k]}<td><div class=pics>{pictures}</div>"
         f"<td>{_curves(track, span, (moved[:, 0], moved[:, 1]), ('#d04a3a', '#3a8a4a'))}"
         f"<td>{_curves(track, span, (deviation,), ('#3a6fd0',), 0.0)}"
         f"<td>{_curves(track, span, (track.score,), ('#8a5ad0',), 0.0, 1.0)}"
@@ -106,7 +103,7 @@ def _overview(tracks: tuple[Track, ...], frame: int, read: Read) -> str:
         near = np.flatnonzero((track.frames <= frame) & (track.frames > frame - 10))
         if not len(near):
             continue
-        bad = min(1.0, float(_deviation(track)[near[-1]]) / 0.5)
+        bad = min(1.0, float(errors_of(track)[near[-1]]) / 0.5)
         colour = (round(60 + 40 * (1 - bad)), round(60 + 160 * (1 - bad)), round(70 + 170 * bad))
         tail = np.round(track.points[near] * 16).astype(np.int32).reshape(-1, 1, 2)
         cv2.polylines(image, [tail], False, colour, size, cv2.LINE_AA, 4)

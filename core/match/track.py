@@ -173,6 +173,18 @@ def keyed_track(track_id: int, name: str, keys: NDArray[np.float64], plate_id: i
     )
 
 
+def errors_of(track: Track) -> NDArray[np.float64]:
+    """(F,) the standard deviation in pixels that a track itself foretells on each of its frames."""
+    error: NDArray[np.float64] = np.sqrt(np.maximum(0.5 * (track.covariance[:, 0] + track.covariance[:, 2]), 0.0))
+    return error
+
+
+def badness_of(track: Track) -> NDArray[np.float64]:
+    """(F,) what tracks and their frames are ranked by: the error in pixels, and what is missing of the likeness."""
+    bad: NDArray[np.float64] = errors_of(track) + (1.0 - track.score)
+    return bad
+
+
 class PlaneTrack(Record):
     """A flat piece of the scene through a plate, each frame as a whole: a corner pin. Pixels and frames as of a track.
 

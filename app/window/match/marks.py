@@ -10,7 +10,7 @@ from core.document import Document
 from core.image.plate import Plate
 from core.image.plate_view import pixels_per_pixel, view_points
 from core.match.outline import curve_through, outline_at
-from core.match.track import PlaneTrack, Track, TrackSettings, carried_points
+from core.match.track import PlaneTrack, Track, TrackSettings, carried_points, errors_of
 from core.overlay import Circle, Label, Marker, Overlay, Overlays, Polyline, Tone
 from tools.match_edits import place_at
 
@@ -116,9 +116,3 @@ def tone_of(track: Track, frame: int) -> Tone:
     if error > POOR or score < UNLIKE:
         return "trouble"
     return "good" if error <= GOOD else "accent"
-
-
-def errors_of(track: Track) -> Array:
-    """(F,) the standard deviation in pixels that a track itself foretells on each of its frames."""
-    error: Array = np.sqrt(np.maximum(0.5 * (track.covariance[:, 0] + track.covariance[:, 2]), 0.0))
-    return error

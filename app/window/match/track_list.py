@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from app.window.desk import Desk
 from app.window.fields.choice_bar import ChoiceBar
-from app.window.match.marks import GOOD, POOR, UNLIKE, errors_of
+from app.window.match.marks import GOOD, POOR, UNLIKE
 from app.window.match.shape_list import ShapeList
 from app.window.pose.graph import Graph, Line
 from app.window.sections import Row
@@ -28,7 +28,7 @@ from app.window.theme import look_of
 from core.document import Document
 from core.field import Field
 from core.image.plate import Plate
-from core.match.track import Track
+from core.match.track import Track, badness_of, errors_of
 from core.workspace import Workspace
 from tools.match_edits import select_tracks, selected_tracks, shown_plate
 
@@ -147,7 +147,7 @@ class TrackList(QWidget):
         if plate is not None and place == len(HEADS) - 1:
             self.desk.set_workspace(frame=float(self.list.frame_pressed(plate) + plate.offset))
         elif plate is not None and track is not None and len(track.frames):
-            worst = int(track.frames[int(np.argmax(errors_of(track) + (1.0 - track.score)))])
+            worst = int(track.frames[int(np.argmax(badness_of(track)))])
             self.desk.set_workspace(frame=float(worst + plate.offset))
 
     def _pointed(self, frame: float) -> None:
@@ -275,6 +275,5 @@ def worst_of(track: Track) -> tuple[float, float]:
 
 
 def badness(track: Track) -> float:
-    """What tracks are sorted by: the error in pixels, and what is missing of the likeness."""
-    error, score = worst_of(track)
-    return error + (1.0 - score)
+    """How bad a track is on its worst frame."""
+    return float(badness_of(track).max(initial=0.0))

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from app.window.desk import Desk
 from app.window.match.doors import MatchDoors
 from app.window.match.eye import PlateEye
-from app.window.match.marks import Sheet, errors_of, marks_of
+from app.window.match.marks import Sheet, marks_of
 from app.window.match.model_job import ModelJob
 from app.window.match.model_marks import model_marks
 from app.window.match.pattern import patches
@@ -22,6 +22,7 @@ from app.window.match.solve_job import SolveJob
 from app.window.match.solve_marks import solve_marks
 from app.window.match.tracking import MatchTracking
 from core.image.plate_view import pixels_per_pixel, plate_size
+from core.match.track import errors_of
 from core.overlay import Fill, Overlays, Polyline
 from tools.match_edits import place_at, selected_tracks
 from tools.photomodel_edits import model_of, photo_of
