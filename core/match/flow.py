@@ -35,7 +35,8 @@ from core.workers import serial_ranges
 
 Field = NDArray[np.float32]
 Ranges = Callable[[int, Callable[[int, int], object], int], None]
-LEVELS = ((4, 1.2), (2, 1.0), (1, 0.5))  # spacing over the finest; pixels of the Gauss before the frames are compared
+# spacing over the finest; pixels of the Gauss before the frames are compared; of how many rows and columns one counts
+LEVELS = ((4, 1.2, 2), (2, 1.0, 2), (1, 0.5, 1))
 BIAS = 15  # pixels: side of the window whose mean difference is light, not motion
 STIFFNESS = 0.02  # of the strength of the data: keeps the grid still where there is nothing to see
 SWEEPS = 5  # of conjugate gradients in a step of Gauss-Newton
@@ -82,8 +83,7 @@ def flow_between(
     flow = fitted(start, LEVELS[0][0] * spacing, ranges)
     covariance = np.zeros((*a.shape, 3), np.float32)
     torn = np.ones(a.shape, np.float32)  # where the grid of the level is needed
-    room = np.empty((7, *a.shape), np.float32)
-    for level, (times, sigma) in enumerate(LEVELS):
+    for level, (times, sigma, every) in enumerate(LEVELS):
         step = times * spacing
         if level:
             torn = _torn(a, b, flow, start, left)
@@ -92,10 +92,11 @@ def flow_between(
         if not active.any() or (cancel is not None and cancel()):
             break
         ga, gb = (np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.float32) for image in (a, b))
-        seen = _compared(ga, gb, flow, room)
-        flow = flow + _step(seen, step, active, ranges)
+        seen = _compared(ga, gb, flow, every)
+        flow = flow + _pixels(_step(seen, step // every, active, ranges), step, a.shape, ranges)
         if not level:
-            covariance = _covariance(seen, step, ranges)
+            alone = _covariance(seen, step // every, ranges) / np.float32(every**2)
+            covariance = _pixels(np.asarray(alone, np.float32), step, a.shape, ranges)
     flow = flow + _soft(_torn(a, b, flow, start, left), 3) * (start - flow)
     apart = ALIKE + APART * _disagreement(a, b, flow)
     _add_missed(covariance, flow, start, backs, apart)
@@ -203,9 +204,9 @@ def _banded(grids: Field, down: Field, across: Field) -> Field:
 
 
 class _Compared(NamedTuple):
-    """What two frames say about a flow: Gauss-Newton's tensors and right side, squared residuals, 1 inside; (H, W).
+    """What two frames say about a flow: Gauss-Newton's tensors and right side, squared residuals, 1 inside.
 
-    noise : standard deviation of the residuals.
+    Fields (rows, columns) of the pixels that count. noise : standard deviation of the residuals.
     """
 
     xx: Field
@@ -218,31 +219,31 @@ class _Compared(NamedTuple):
     noise: float
 
 
-def _compared(first: Field, second: Field, flow: Field, room: Field) -> _Compared:
-    """What the frames say about `flow`, written into `room` (7, H, W)."""
+def _compared(first: Field, second: Field, flow: Field, every: int) -> _Compared:
+    """What the frames say about a flow, in one of `every` rows and columns: a wide spline needs no more."""
     warped = _warped(second, flow, cv2.INTER_CUBIC)
     both = cv2.add(warped, first)
     gx = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 1, 0, scale=1.0 / 64.0)))
     gy = _unlit(np.asarray(cv2.Scharr(both, cv2.CV_32F, 0, 1, scale=1.0 / 64.0)))
     rest = _unlit(warped - first)
     noise = 1.4826 * float(np.median(np.abs(rest[::3, ::3]))) + 1e-6
-    xx, xy, yy, bx, by, square, inside = room
-    data_term(rest, flow, gx, gy, noise, xx, xy, yy, bx, by, square, inside)
+    shape = tuple(-(-side // every) for side in rest.shape)
+    xx, xy, yy, bx, by, square, inside = (np.empty(shape, np.float32) for _ in range(7))
+    data_term(rest, flow, gx, gy, noise, every, xx, xy, yy, bx, by, square, inside)
     return _Compared(xx, xy, yy, bx, by, square, inside, noise)
 
 
 def _step(seen: _Compared, step: int, active: Field, ranges: Ranges) -> Field:
-    """One step of Gauss-Newton on the vertices `active`: what is to be added to the flow."""
+    """One step of Gauss-Newton on the vertices `active`: (2, rows, columns) to be added to the flow's spline."""
     squares = _onto_all([seen.xx, seen.yy], step, ranges, 2)
     stiff = _stiffness(squares)
     free = active / (squares + stiff)
     right = _onto_all([seen.bx, seen.by], step, ranges)
-    move = np.clip(_solve(seen, right, free, stiff, step, ranges), -MOST, MOST)
-    return _pixels(np.asarray(move, np.float32), step, seen.inside.shape, ranges)
+    return np.clip(_solve(seen, right, free, stiff, step, ranges), -MOST, MOST)
 
 
 def _covariance(seen: _Compared, step: int, ranges: Ranges) -> Field:
-    """Of every pixel (H, W, 3), as its vertex alone would have it."""
+    """Of every vertex (3, rows, columns), as it alone would have it."""
     xx, xy, yy = _onto_all([seen.xx, seen.xy, seen.yy], step, ranges, 2)
     # how well the frames agree around a vertex; pixels outside say nothing: as bad as a whole grey
     weight, square, inside = _onto_all([np.ones_like(seen.inside), seen.square, seen.inside], step, ranges)
@@ -250,8 +251,7 @@ def _covariance(seen: _Compared, step: int, ranges: Ranges) -> Field:
     variance = np.maximum(variance, np.float32(max(0.25 * seen.noise**2, ROUNDING**2)))
     stiff = _stiffness(np.stack((xx, yy)))
     xx, yy = xx + stiff, yy + stiff
-    grids = np.stack((yy, -xy, xx)) * (variance / (xx * yy - xy * xy))
-    return _pixels(np.asarray(grids, np.float32), step, seen.inside.shape, ranges)
+    return np.asarray(np.stack((yy, -xy, xx)) * (variance / (xx * yy - xy * xy)), np.float32)
 
 
 def _stiffness(squares: Field) -> np.float32:

@@ -136,19 +136,21 @@ def normal_product(grid, busy, xx, xy, yy, step, first, stop, out):  # type: ign
 
 
 @njit(
-    types.void(F32_2D, F32_3D, F32_2D, F32_2D, f32, *([W_F32_2D] * 7)),
+    types.void(F32_2D, F32_3D, F32_2D, F32_2D, f32, i64, *([W_F32_2D] * 7)),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
-def data_term(rest, flow, gx, gy, scale, xx, xy, yy, bx, by, square, inside):  # type: ignore[no-untyped-def]
+def data_term(rest, flow, gx, gy, scale, every, xx, xy, yy, bx, by, square, inside):  # type: ignore[no-untyped-def]
     """Gauss-Newton's tensors and right side per pixel for the residuals `rest`, with Geman & McClure's weights.
 
-    inside : becomes 1 where the flow ends in the frame, else 0. square : the squared residual, 0 outside.
+    every : of so many rows and columns one is made. inside : becomes 1 where the flow ends in the frame, else 0.
+    square : the squared residual, 0 outside.
     """
     height, width = rest.shape
     limit = np.float32(1.0) / (np.float32(9.0) * scale * scale)
     right, bottom = np.float32(width - 1), np.float32(height - 1)
-    for y in range(height):
-        for x in range(width):
+    for j in range(xx.shape[0]):
+        for i in range(xx.shape[1]):
+            y, x = j * every, i * every
             r = rest[y, x]
             tx, ty = flow[y, x, 0] + np.float32(x), flow[y, x, 1] + np.float32(y)
             seen = np.float32(1.0) if tx >= 0.0 and tx <= right and ty >= 0.0 and ty <= bottom else np.float32(0.0)
@@ -156,10 +158,10 @@ def data_term(rest, flow, gx, gy, scale, xx, xy, yy, bx, by, square, inside):  #
             w = w * w * seen
             u, v = gx[y, x], gy[y, x]
             wu, wv = w * u, w * v
-            xx[y, x], xy[y, x], yy[y, x] = wu * u, wu * v, wv * v
-            bx[y, x], by[y, x] = -wu * r, -wv * r
-            square[y, x] = r * r * seen
-            inside[y, x] = seen
+            xx[j, i], xy[j, i], yy[j, i] = wu * u, wu * v, wv * v
+            bx[j, i], by[j, i] = -wu * r, -wv * r
+            square[j, i] = r * r * seen
+            inside[j, i] = seen
 
 
 @njit(types.void(F32_3D, W_F32_2D, W_F32_2D), cache=True, nogil=True, error_model="numpy")

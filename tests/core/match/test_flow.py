@@ -152,12 +152,15 @@ def test_pixels_that_end_outside_the_frame_say_nothing():
     gone[1, 0] = gone[1, 3] = gone[0, 1] = gone[2, 1] = True
     rest, gx, gy = (np.full((3, 4), value, np.float32) for value in (0.3, 2.0, -1.0))
     xx, xy, yy, bx, by, square, inside = out = np.empty((7, 3, 4), np.float32)
-    data_term(rest, flow, gx, gy, np.float32(0.1), *out)
+    data_term(rest, flow, gx, gy, np.float32(0.1), 1, *out)
     np.testing.assert_array_equal(inside, ~gone)
     assert (out[:, gone] == 0.0).all()
     for part, expected in zip((xx, xy, yy, bx, by), (1.0, -0.5, 0.25, -0.15, 0.075), strict=True):
         np.testing.assert_allclose(part[~gone], expected, rtol=1e-5)  # residual at three sigma: a quarter of the weight
     np.testing.assert_allclose(square[~gone], 0.09, rtol=1e-5)
+    some = np.empty((7, 2, 2), np.float32)
+    data_term(rest, flow, gx, gy, np.float32(0.1), 2, *some)
+    np.testing.assert_array_equal(some, out[:, ::2, ::2])
 
 
 def test_flow_is_read_by_another_library(tmp_path):
