@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QFontMetrics, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
@@ -12,6 +14,8 @@ from app.window.jobs import JobsBar
 from app.window.keymap import Keymap
 from app.window.theme import look_of
 from core.workspace import Workspace
+from tools.match_edits import shown_plate
+from tools.ring import BrushParams, RingParams
 
 SAID_MS = 6000  # how long something said stays, before the hint comes back
 FAILED_MS = 20000
@@ -136,10 +140,13 @@ def hint(desk: Desk, keymap: Keymap) -> str:
     if empty:
         return "Open a mesh, a plate or a project, or drop a file here."
     parts = [desk.session.tool.hint] if desk.document.grooms or desk.session.tool.craft != "groom" else []
-    parts += [f"{_written(keys)}: {words}" for brush, words in (("size", "size"), ("strength", "strength"))
-              if (keys := keymap.brush.get(brush))]  # type: ignore[call-overload] # these are names of the record
+    tool = desk.session.tool
+    brushes: list[Literal["size", "strength"]] = ["size"] if isinstance(tool.params, RingParams) else []
+    brushes += ["strength"] if isinstance(tool.params, BrushParams) else []
+    flat = tool.craft == "match" and shown_plate(desk.document) is not None
+    parts += [f"{_written(keys)}: {brush}" for brush in brushes if (keys := keymap.brush.get(brush))]
     parts += [f"{_written(keys)}: {words}" for action, words in ACTIONS
-              if (keys := keymap.navigate.get(action))]  # type: ignore[call-overload]
+              if not (flat and action == "orbit") and (keys := keymap.navigate.get(action))]  # type: ignore[call-overload]
     if radial := keymap.brush.get("radial"):
         parts.append(f"{_written(radial)}: menu")
     return GAP.join(parts)

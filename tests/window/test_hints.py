@@ -113,3 +113,10 @@ def test_turning_keeps_up_or_rolls_as_preferred(opened: Opened, animal: Document
         right = window.desk.workspace.cameras[0].world_from_camera[:3, 0]
         assert (abs(right[1]) < 1e-6) == level, gesture
         assert np.linalg.det(window.desk.workspace.cameras[0].world_from_camera[:3, :3]) == pytest.approx(1.0)
+
+
+def test_rings_are_told_of_where_the_tool_has_one(hand: Hand) -> None:
+    desk, keymap = hand.window.desk, hand.window.hotkeys.keymap
+    for tool, told in (("comb", ("size", "strength")), ("plant", ()), ("delete", ("size",))):
+        desk.choose(tool)
+        assert tuple(what for what in ("size", "strength") if f"F: {what}" in hint(desk, keymap)) == told, tool
