@@ -24,7 +24,7 @@ LENSES = tuple(model.name for model in MODELS)
 def command(
     photographs: Annotated[list[Path], typer.Argument(help="Photographs of a chessboard, taken with the lens.", show_default=False)],
     grid: Annotated[str, typer.Option(help="Inner corners of the board across and down, as 9x6.")],
-    lens: Annotated[str, typer.Option(help="Which lens is found: brown, fisheye, or of 3DEqualizer radial4 and anamorphic4.")] = "brown",
+    lens: Annotated[str, typer.Option(help="Which lens is found: brown, brown5, fisheye, or of 3DEqualizer radial4 and anamorphic4.")] = "brown",
     output: Annotated[list[Path] | None, typer.Option("-o", "--output", help="Where the lens goes: .json, or .txt of 3DEqualizer; more than one may be given.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:

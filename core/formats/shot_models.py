@@ -23,7 +23,7 @@ LARGEST = 1 << 30
 # number, how many parameters, whether fx and fy are apart, which columns of our lens follow the centre
 MODELS = {
     "SIMPLE_PINHOLE": (0, 3, False, ()), "PINHOLE": (1, 4, True, ()), "SIMPLE_RADIAL": (2, 4, False, (1,)),
-    "RADIAL": (3, 5, False, (1, 2)), "OPENCV": (4, 8, True, (1, 2)), "OPENCV_FISHEYE": (5, 8, True, (1, 2, 6, 7)),
+    "RADIAL": (3, 5, False, (1, 2)), "OPENCV": (4, 8, True, (1, 2, 6, 7)), "OPENCV_FISHEYE": (5, 8, True, (1, 2, 6, 7)),
 }  # fmt: skip
 NAMES = {number: name for name, (number, *_) in MODELS.items()}
 
@@ -36,11 +36,13 @@ def write_colmap(path: Path, shot: Shot) -> None:
     UserError
         COLMAP has no such lens, or a file could not be written.
     """
-    model = {"brown": "OPENCV", "fisheye": "OPENCV_FISHEYE"}.get(model_of(shot.lens).name)
-    if model is None:
-        raise UserError(f"COLMAP has no lens of the model {model_of(shot.lens).name}; undistort the plate first.")
+    kind = model_of(shot.lens).name
+    model = {"brown": "OPENCV", "brown5": "OPENCV", "fisheye": "OPENCV_FISHEYE"}.get(kind)
+    if model is None or (kind == "brown5" and shot.lens[8] != 0.0):
+        with_what = " with a k3" if model else ""
+        raise UserError(f"COLMAP has no lens of the model {kind}{with_what}; undistort the plate first.")
     lens, stretch = shot.lens, shot.stretch
-    rest = [*lens[4:6] + 0.5, *lens[1:3], *((0.0, 0.0) if model == "OPENCV" else lens[6:8])]
+    rest = [*lens[4:6] + 0.5, *lens[1:3], *((0.0, 0.0) if kind == "brown" else lens[6:8])]
     cameras = [(k + 1, [f, f * stretch, *rest]) for k, f in enumerate(shot.focal if shot.zooms else shot.focal[:1])]
     turns = Rotation.from_matrix(shot.rotation).as_quat()[:, [3, 0, 1, 2]]
     images = [
@@ -194,14 +196,15 @@ def _lens(model: str, size: tuple[int, int], values: list[float]) -> Array:
     _, count, apart, columns = MODELS[model]
     if len(values) != count or not np.isfinite(values).all() or min(size) < 1 or values[0] <= 0:
         raise ValueError
-    lens = start_lens(values[0], *size, "fisheye" if model == "OPENCV_FISHEYE" else "brown")
+    kind = {"OPENCV": "brown5", "OPENCV_FISHEYE": "fisheye"}.get(model, "brown")
+    if model == "OPENCV" and not any(values[6:8]):
+        kind, columns = "brown", columns[:2]
+    lens = start_lens(values[0], *size, kind)
     if apart:
         lens[3] = np.log(values[1] / values[0])
     after = 2 if apart else 1
     lens[4:6] = np.array(values[after : after + 2]) - 0.5
     lens[list(columns)] = values[after + 2 : after + 2 + len(columns)]
-    if model == "OPENCV" and any(values[6:8]):
-        raise UserError("The lens has a tangential part, which is not read; export it without.")
     return lens
 
 

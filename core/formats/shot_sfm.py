@@ -6,15 +6,13 @@ Bundler: ``bundle.out``, y up, looking along -z, places in the picture from its 
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.errors import UserError
 from core.formats.shot_models import frame_of, picture_name, shot_of_images
-from core.match.lens import model_of, start_lens
+from core.match.lens import coefficients, model_of, start_lens
 from core.match.solve.shot import FLIP, Shot
 
 OPENSFM = "reconstruction.json"
@@ -61,12 +59,11 @@ def opensfm_text(shot: Shot) -> str:
     UserError
         OpenSfM has no such lens.
     """
-    kind = {"brown": "brown", "fisheye": "fisheye_opencv"}.get(model_of(shot.lens).name)
-    if kind is None:
-        raise UserError(f"OpenSfM has no lens of the model {model_of(shot.lens).name}; undistort the plate first.")
     lens, long = shot.lens, float(max(shot.size))
-    bend: dict[str, Any] = {"k1": float(lens[1]), "k2": float(lens[2])}
-    bend |= {"p1": 0.0, "p2": 0.0, "k3": 0.0} if kind == "brown" else {"k3": float(lens[6]), "k4": float(lens[7])}
+    kind = {"brown": "brown", "brown5": "brown", "fisheye": "fisheye_opencv"}.get(model_of(lens).name)
+    if kind is None:
+        raise UserError(f"OpenSfM has no lens of the model {model_of(lens).name}; undistort the plate first.")
+    bend = ({"p1": 0.0, "p2": 0.0, "k3": 0.0} if kind == "brown" else {}) | coefficients(lens)
     right, below = shot.off_centre
     cameras = {
         f"camera{k + 1}": {
@@ -123,17 +120,15 @@ def read_opensfm(data: bytes, name: str) -> Shot:
             kind = camera["projection_type"]
             if kind not in ("perspective", "brown", "fisheye_opencv", "perspective_opencv"):
                 raise UserError(f"{name}: cameras of the kind {str(kind)[:40]} are not read.")
-            if any(camera.get(key, 0.0) for key in ("p1", "p2", "k3", "k4")) and kind != "fisheye_opencv":
-                raise UserError(f"{name}: a lens has a tangential or a third part, which is not read.")
             size = (int(camera["width"]), int(camera["height"]))
             long = float(max(size))
             focal = float(camera["focal"] if "focal" in camera else camera["focal_x"])
-            lens = start_lens(focal * long, *size, "fisheye" if kind == "fisheye_opencv" else "brown")
+            more = any(camera.get(key, 0.0) for key in ("p1", "p2", "k3"))
+            model = "fisheye" if kind == "fisheye_opencv" else "brown5" if more else "brown"
+            lens = start_lens(focal * long, *size, model)
             lens[3] = np.log(float(camera.get("focal_y", focal)) / focal)
             lens[4:6] += long * np.array([camera.get("c_x", 0.0), camera.get("c_y", 0.0)])
-            lens[1:3] = camera.get("k1", 0.0), camera.get("k2", 0.0)
-            if kind == "fisheye_opencv":
-                lens[6:8] = camera.get("k3", 0.0), camera.get("k4", 0.0)
+            lens[[1, 2, *range(6, len(lens))]] = [camera.get(key, 0.0) for key in coefficients(lens)]
             turn = Rotation.from_rotvec(np.array(shot["rotation"], np.float64)).as_matrix()
             images.append((frame_of(image, k), turn, np.array(shot["translation"], np.float64), lens, size))
         points = np.array([point["coordinates"] for point in found["points"].values()], np.float64).reshape(-1, 3)

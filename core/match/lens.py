@@ -5,6 +5,7 @@ length in pixels, two first coefficients, logarithm of the pixels' height over w
 numbers at pixel centres, y down). The other columns, and how many there are, belong to the model:
 
 brown : k1, k2 of r^2 and r^4, of coordinates over depth.
+brown5 : the same; p1, p2 of a lens out of line with its others; k3 of r^6: the five numbers of OpenCV.
 fisheye : k1 to k4 of the 3rd, 5th, 7th and 9th power of the angle; it sees less than a half turn.
 radial4 : c2, c4; the unit, pixels of half the diagonal; u1, v1, u3, v3; the bend of a cylinder as two numbers a, b,
     the logarithm of its stretch along twice the angle. y down, where 3DEqualizer has it up.
@@ -22,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
-from core.match.lens_kernels import ANAMORPHIC4, BROWN, FISHEYE, RADIAL4, UNIT, bend, straighten
+from core.match.lens_kernels import ANAMORPHIC4, BROWN, BROWN5, FISHEYE, RADIAL4, UNIT, bend, straighten
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ class LensModel(NamedTuple):
 
 MODELS = (
     LensModel("brown", BROWN, (1,), (1, 2), ()),
+    LensModel("brown5", BROWN5, (1,), (1, 2, 6, 7, 8), ("p1", "p2", "k3")),
     LensModel("fisheye", FISHEYE, (1,), (1, 2, 6, 7), ("k3", "k4")),
     LensModel("radial4", RADIAL4, (1,), (1, 2, 7, 8, 9, 10), (
         "unit", "u1", "v1", "u3", "v3", "cylinder a", "cylinder b")),
@@ -47,7 +49,8 @@ MODELS = (
         "unit", "cx22", "cy22", "cx04", "cy04", "cx24", "cy24", "cx44", "cy44", "turn", "squeeze x", "squeeze y")),
 )
 FIRST_NAMES = {
-    "brown": ("k1", "k2"), "fisheye": ("k1", "k2"), "radial4": ("c2", "c4"), "anamorphic4": ("cx02", "cy02"),
+    "brown": ("k1", "k2"), "brown5": ("k1", "k2"), "fisheye": ("k1", "k2"), "radial4": ("c2", "c4"),
+    "anamorphic4": ("cx02", "cy02"),
 }  # fmt: skip
 
 
@@ -74,7 +77,7 @@ def start_lens(focal: float, width: int, height: int, model: str = "brown") -> A
     """A lens (L,) that does not bend, its centre in the middle of the picture; a fisheye keeps the angle instead."""
     lens = np.zeros(model_named(model).columns)
     lens[0], lens[4], lens[5] = np.log(focal), 0.5 * (width - 1), 0.5 * (height - 1)
-    if len(lens) > FISHEYE:
+    if len(lens) >= RADIAL4:
         lens[UNIT] = 0.5 * float(np.hypot(width, height))
     if len(lens) == ANAMORPHIC4:
         lens[16:18] = 1.0

@@ -2,9 +2,9 @@
 
 A lens is one row of numbers whose length says its model (`core/match/lens.py` names the columns). Brown and fisheye
 are written as straight to bent, those of 3DEqualizer as bent to straight; the other way is found by Newton's method and
-its derivatives by the theorem of the implicit function. Sources: Brown, "Decentering distortion of lenses", 1966 (its
-radial part); Kannala and Brandt, "A generic camera model", 2006, section II; "3DE4 Radial - Standard, Degree 4" and
-"3DE4 Anamorphic - Standard, Degree 4" as the Lens Distortion Plugin Kit documents them.
+its derivatives by the theorem of the implicit function. Sources: Brown, "Decentering distortion of lenses", 1966, in
+the numbers of OpenCV; Kannala and Brandt, "A generic camera model", 2006, section II; "3DE4 Radial - Standard, Degree
+4" and "3DE4 Anamorphic - Standard, Degree 4" as the Lens Distortion Plugin Kit documents them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-BROWN, FISHEYE, RADIAL4, ANAMORPHIC4 = 6, 8, 13, 18  # columns of each model
+BROWN, FISHEYE, BROWN5, RADIAL4, ANAMORPHIC4 = 6, 8, 9, 13, 18  # columns of each model
 UNIT = 6  # column of those of 3DEqualizer: pixels of what their polynomials call 1
 STEPS = 40
 CLOSE = 1e-13
@@ -34,6 +34,22 @@ def _brown(lens, x, y, out):  # type: ignore[no-untyped-def]
     out[0], out[1] = bend * x, bend * y
     out[2], out[3], out[4], out[5] = bend + slope * x * x, slope * x * y, slope * x * y, bend + slope * y * y
     out[8], out[9], out[10], out[11] = rr * x, rr * y, rr * rr * x, rr * rr * y
+
+
+@njit(types.void(F1, types.float64, types.float64, OUT), cache=True, nogil=True, error_model="numpy")
+def _brown5(lens, x, y, out):  # type: ignore[no-untyped-def]
+    k1, k2, p1, p2, k3 = lens[1], lens[2], lens[6], lens[7], lens[8]
+    rr = x * x + y * y
+    a, b, c = rr + 2.0 * x * x, rr + 2.0 * y * y, 2.0 * x * y
+    bend = 1.0 + rr * (k1 + rr * (k2 + rr * k3))
+    slope = 2.0 * k1 + rr * (4.0 * k2 + rr * 6.0 * k3)
+    mixed = slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y
+    out[0], out[1] = bend * x + p1 * c + p2 * a, bend * y + p1 * b + p2 * c
+    out[2], out[3] = bend + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x, mixed
+    out[4], out[5] = mixed, bend + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x
+    out[8], out[9], out[10], out[11] = rr * x, rr * y, rr * rr * x, rr * rr * y
+    out[18], out[19], out[20], out[21] = c, b, a, c
+    out[22], out[23] = rr * rr * rr * x, rr * rr * rr * y
 
 
 @njit(types.void(F1, types.float64, types.float64, OUT), cache=True, nogil=True, error_model="numpy")
@@ -141,6 +157,8 @@ def _written(lens, x, y, out):  # type: ignore[no-untyped-def]
         _brown(lens, x, y, out)
     elif len(lens) == FISHEYE:
         _fisheye(lens, x, y, out)
+    elif len(lens) == BROWN5:
+        _brown5(lens, x, y, out)
     elif len(lens) == RADIAL4:
         _radial4(lens, x, y, out)
     else:
@@ -188,7 +206,7 @@ def pixel_of(lens, focal, x, y, out):  # type: ignore[no-untyped-def]
     focal : logarithm of the zoom of the frame; its derivative is that by column 0. False where the lens leads nowhere.
     """
     scale, stretch = math.exp(lens[0] + focal), math.exp(lens[3])
-    if len(lens) == BROWN or len(lens) == FISHEYE:
+    if len(lens) < RADIAL4:
         _written(lens, x, y, out)
         unit, inner, fine = scale, 1.0, out[2] * out[5] - out[3] * out[4] > LEAST_SLOPE
         by_x, by_y = out[0], out[1]
@@ -204,7 +222,7 @@ def pixel_of(lens, focal, x, y, out):  # type: ignore[no-untyped-def]
     out[6], out[7] = unit * by_x, unit * stretch * by_y
     out[12], out[13] = 0.0, out[1]
     out[14], out[15], out[16], out[17] = 1.0, 0.0, 0.0, 1.0
-    if len(lens) > FISHEYE:
+    if len(lens) >= RADIAL4:
         out[6 + 2 * UNIT], out[7 + 2 * UNIT] = 0.0, 0.0
     out[0], out[1] = out[0] + lens[4], out[1] + lens[5]
     return fine
@@ -226,7 +244,7 @@ def straighten(lens, focal, xy, flat):  # type: ignore[no-untyped-def]
     stretch = math.exp(lens[3])
     for n in range(len(xy)):
         scale = math.exp(lens[0] + focal[n])
-        near = len(lens) == BROWN or len(lens) == FISHEYE
+        near = len(lens) < RADIAL4
         unit = scale if near else lens[UNIT]
         x, y = (xy[n, 0] - lens[4]) / unit, (xy[n, 1] - lens[5]) / (unit * stretch)
         if near:

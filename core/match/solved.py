@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from core.match.solve.shot import Shot
 
 Array = NDArray[np.float64]
-LENSES = ("none", "brown", "fisheye", "radial4", "anamorphic4")
+LENSES = ("none", "brown", "brown5", "fisheye", "radial4", "anamorphic4")
 LEAST_COLUMNS, MOST_COLUMNS = 6, 18  # of a lens
 LONGEST = 2000  # letters of a warning
 UNASKED = freeze(np.zeros((0, 3, 3)))
@@ -34,7 +34,8 @@ class SolveSettings(Record):
     free_focal: Annotated[bool, field(
         "Find it too", "The focal length given is only where the search begins; a better one is found.")] = False
     lens: Annotated[str, field(
-        "Lens", "Which bend of the lens is found: none, Brown, fisheye, or those of 3DEqualizer.", choices=LENSES,
+        "Lens", "Which bend of the lens is found: none, Brown of two or five numbers, fisheye, or of 3DEqualizer.",
+        choices=LENSES,
     )] = "none"
     zoom: Annotated[bool, field("Zooms", "The focal length changes over the shot and is found on every frame.")] = False
     nodal: Annotated[bool, field("Only turns", "The camera stands on a tripod: it turns and does not move.")] = False

@@ -25,6 +25,7 @@ def _shot(model: str = "brown", zoom: bool = False, bent: bool = True) -> Shot:
     lens = start_lens(focal[0], *SIZE, model)
     if bent:
         lens[1:3] = -0.03, 0.01
+        lens[6:8] = (0.002, -0.003)[: len(lens) - 6]
     translation = -np.einsum("fij,fj->fi", rotation, centres)
     seen = rng.uniform([-0.4, -0.2, 6.0], [0.4, 0.2, 12.0], (30, 3))
     points = (seen * [[8.0, 8.0, 1.0]] - translation[5]) @ rotation[5]
@@ -42,6 +43,7 @@ def _same_pictures(a: Shot, b: Shot) -> None:
 @pytest.mark.parametrize(("name", "model", "zoom"), [
     ("a.usda", "fisheye", False), ("a.usdc", "brown", True), ("cameras.txt", "brown", False),
     ("cameras.txt", "fisheye", True), ("cameras.bin", "brown", True), ("cameras.bin", "fisheye", False),
+    ("cameras.txt", "brown5", False), ("cameras.bin", "brown5", True), ("a.usda", "brown5", True),
 ])  # fmt: skip
 def test_what_is_written_is_read_again(name, model, zoom, tmp_path):
     made = _shot(model, zoom)
@@ -208,13 +210,22 @@ def test_bundler_and_opensfm_are_written(tmp_path):
     np.testing.assert_allclose([float(x) + 959.5, 539.5 - float(y)], at, atol=0.006)
     with pytest.raises(UserError, match="Bundler has only"):
         write_shot(tmp_path / "b.out", _shot("fisheye"), {})
-    for model in ("brown", "fisheye"):
+    for model in ("brown", "brown5", "fisheye"):
         made = _shot(model, zoom=model == "brown")
+        if model == "brown5":
+            made.lens[8] = 0.004
         made.lens[3:6] += 0.1, 11.0, -5.0
         write_shot(tmp_path / "reconstruction.json", made, {})
         _same_pictures(made, read_shot(tmp_path / "reconstruction.json", None))
     with pytest.raises(UserError, match="written as"):
         check_writable(tmp_path / "solve.json")
+
+
+def test_colmap_has_no_third_number_of_brown(tmp_path):
+    made = _shot("brown5")
+    made.lens[8] = 0.004
+    with pytest.raises(UserError, match="brown5 with a k3"):
+        write_shot(tmp_path / "cameras.txt", made, {})
 
 
 def test_opensfm_is_read(tmp_path):

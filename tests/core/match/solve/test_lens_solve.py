@@ -10,6 +10,7 @@ from core.match.solve.state import projected, residuals
 from tests.core.match.solve.shots import FOCAL, NOISE, SIZE, path_error, shot
 
 NUMBERS = {
+    "brown5": {1: -0.06, 2: 0.02, 6: 0.003, 7: -0.002, 8: 0.004},
     "fisheye": {1: -0.03, 2: 0.01},
     "radial4": {1: 0.06, 2: 0.01, 7: 0.004, 8: -0.003},
     "anamorphic4": {1: 0.03, 2: 0.05, 7: -0.02, 8: 0.02, 9: 0.004},
