@@ -15,9 +15,9 @@ from core.groom.rows import take_rows
 from core.overlay import Overlays
 from core.record import freeze
 from tools.groom.craft import GroomGround
+from tools.ground import Ground, Pointer
 from tools.ring import BrushParams, ReachParams, RingParams, ring_radius, ring_strength
 from tools.screen import Screen
-from tools.tool import Ground, Pointer
 
 R = TypeVar("R", bound=RingParams)
 A = TypeVar("A", bound=ReachParams)

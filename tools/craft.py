@@ -10,7 +10,8 @@ from core.evaluator import Evaluator
 from core.groom.groom import Groom
 from core.history import History
 from core.workspace import Workspace
-from tools.tool import Ground, Sight, Tool
+from tools.ground import Ground, Sight
+from tools.tool import Tool
 
 G = TypeVar("G", bound=Ground)
 V = TypeVar("V")

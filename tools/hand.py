@@ -17,10 +17,11 @@ from core.document import Document
 from core.errors import UserError
 from core.overlay import Circle, Overlays
 from tools.craft import Craft, Work
+from tools.ground import Ground, Pointer, Sight
 from tools.pen import Pen, PenSettings
 from tools.registry import Registry
 from tools.ring import RingParams, ring_radius
-from tools.tool import Ground, NamesStep, Picks, Pointer, Sight, Stroke, Tool
+from tools.tool import NamesStep, Picks, Stroke, Tool
 
 
 class Owner(Work, Protocol):

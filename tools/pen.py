@@ -9,7 +9,7 @@ import numpy as np
 from core.errors import UserError
 from core.field import field
 from core.record import Record, number
-from tools.tool import Pointer
+from tools.ground import Pointer
 
 SETTLING = 0.04  # seconds after the first touch in which tablets report pressures that were never meant
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from core.falloff import SHAPES, Shape
 from core.field import field
 from core.overlay import Circle, Overlays
 from core.record import Record
-
-if TYPE_CHECKING:
-    from tools.tool import Ground, Pointer
+from tools.ground import Ground, Pointer
 
 WORLD_PIXELS = 1000.0  # a size in the world is given as pixels at this many pixels per diagonal of the skin
 LIGHTEST = 0.05  # of its size a ring keeps under the lightest touch

@@ -12,7 +12,7 @@ from core.document import MeshObject
 from core.evaluator import Evaluator
 from core.mesh.bvh import cast_rays
 from core.mesh.skin import Skin
-from tools.tool import Ground, Hit, Pointer
+from tools.ground import Ground, Hit, Pointer
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,8 +22,8 @@ from app.window.picture_drag import PictureDrag, PinnedPictures
 from app.window.radial import Entry, RadialMenu
 from core.errors import UserError
 from core.overlay import Label, Overlays
+from tools.ground import Pointer, Sight
 from tools.ring import BrushParams, RingParams
-from tools.tool import Pointer, Sight
 
 # up, right, down, left, then between; see app.window.radial
 RADIAL = (

@@ -48,7 +48,7 @@ from core.errors import UserError
 from core.gate import gate_box, seen_through
 from core.overlay import Overlays
 from core.workspace import Workspace
-from tools.tool import Pointer, Sight
+from tools.ground import Pointer, Sight
 from viewport.gate import gate_marks
 from viewport.panes import corner_of, pane_at, size_of
 from viewport.scene import Scene

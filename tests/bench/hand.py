@@ -12,8 +12,8 @@ from core.camera import frame_points
 from core.demo import demo_document
 from core.evaluator import Evaluator
 from tests.bench.bench import Row
+from tools.ground import Pointer, Sight
 from tools.session import Session
-from tools.tool import Pointer, Sight
 
 TITLE = "Hand"
 GUIDES = 20_000

@@ -20,11 +20,11 @@ from core.pose.synthesis import pose_at
 from core.posed import skin_at
 from core.workspace import Workspace
 from tests.tools.scenes import line
+from tools.ground import Sight
 from tools.hand import StrokeRecord
 from tools.pose_edits import add_rig, hold_pose
 from tools.registry import Registry
 from tools.session import Session
-from tools.tool import Sight
 
 ANIMATION = Path(os.environ.get("FILOPLUME_DATA", "../shared/data")) / "animation"
 SCULPTS = [kind.name for kind in Registry(()).of("pose") if kind.edits == "surface"]

@@ -17,9 +17,10 @@ from core.workspace import Respect, Workspace
 from tests.tools.scenes import BENT, guides_of, pointers, session, sight
 from tests.tools.some_params import some_params
 from tools.groom.actions import ACTIONS
+from tools.ground import Pointer
 from tools.pose.actions import ACTIONS as POSE_ACTIONS
 from tools.registry import Registry
-from tools.tool import Pointer, Turn
+from tools.tool import Turn
 
 REGISTRY = Registry(())
 TOOLS = REGISTRY.tools

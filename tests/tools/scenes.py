@@ -18,8 +18,8 @@ from core.pose.skeleton import Clip, Skeleton, SkinWeights
 from core.record import freeze
 from core.workspace import Workspace
 from tests.core.groom.small_grooms import ball, fur
+from tools.ground import Pointer, Sight
 from tools.session import Session
-from tools.tool import Pointer, Sight
 
 SIZE = 400
 EVALUATOR = Evaluator()

@@ -15,8 +15,8 @@ from core.record import freeze
 from core.workspace import Respect, Workspace
 from tests.core.groom.small_grooms import segment_lengths
 from tests.tools.scenes import BENT, SIZE, document, empty, guides_of, line, pointers, session, sight, symmetric_fur
+from tools.ground import Pointer
 from tools.session import Session
-from tools.tool import Pointer
 
 WAY = line((150, 190), (250, 210))
 

@@ -12,10 +12,10 @@ from core.match.outline import filled, outline_at
 from core.match.track import keyed_track
 from core.workspace import Workspace
 from tools import match_edits as edits
+from tools.ground import Pointer, Sight
 from tools.pen import PenSettings
 from tools.registry import Registry
 from tools.session import Session
-from tools.tool import Pointer, Sight
 
 SIZE = (800, 600)
 PLATE = Plate(id=1, name="shot", path="shot.####.png", first=11, last=30, width=320, height=240, offset=990)

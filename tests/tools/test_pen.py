@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from core.errors import UserError
+from tools.ground import Pointer
 from tools.pen import SETTLING, Pen, PenSettings
-from tools.tool import Pointer
 
 RAW = PenSettings(spikes=False, smoothing=0.0)
 

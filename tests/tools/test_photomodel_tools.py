@@ -13,10 +13,10 @@ from core.match.photomodel.solve import solved
 from core.workspace import Workspace
 from tests.core.match.photomodel.scenes import HOUSE, PHOTOS, SIZE, edge_errors, house, places
 from tools import photomodel_edits as edits
+from tools.ground import Pointer, Sight
 from tools.match_edits import add_plate
 from tools.registry import Registry
 from tools.session import Session
-from tools.tool import Pointer, Sight
 
 VIEW = (1500, 1000)
 CAMERA = plate_camera(1500.0, -1000.0, 2000.0)  # half a pixel of the view for one of the photograph

@@ -22,9 +22,9 @@ from core.record import freeze
 from core.workspace import Respect, Workspace
 from tests.core.pose.arms import arm, turned
 from tests.tools.scenes import sight
+from tools.ground import Pointer
 from tools.pose.posing import joints_of
 from tools.session import Session
-from tools.tool import Pointer
 
 SIGHT = sight(distance=2.5)
 

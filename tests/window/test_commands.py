@@ -19,8 +19,8 @@ from core.document import with_groom
 from core.errors import UserError
 from core.value import Value
 from tests.window.host import Host
+from tools.ground import Pointer, Sight
 from tools.registry import Registry
-from tools.tool import Pointer, Sight
 
 TABLE = all_commands(Registry(()))
 EVERY = pytest.mark.parametrize("command", TABLE, ids=[command.name for command in TABLE])

@@ -10,7 +10,7 @@ from app.window.commands import Commands
 from core.document import Document
 from tests.window.conftest import Opened
 from tests.window.hand import CTRL, LEFT, RIGHT, SHIFT, Hand
-from tools.tool import Pointer
+from tools.ground import Pointer
 
 BACK, ASIDE = (0.60, 0.42), (0.68, 0.36)  # on the animal's back
 NOWHERE = (0.04, 0.55)

@@ -12,8 +12,9 @@ from core.groom.clone import clone
 from core.groom.guides import Guides
 from core.overlay import Marker, Overlays, Polyline
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import RingParams, ring_overlays, ring_radius
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 PICK = 12.0  # pixels around the pointer within which a single strand is found
 MOST_SHOWN = 64  # strands of the source that are drawn

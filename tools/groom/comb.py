@@ -15,8 +15,9 @@ from core.groom.region import facing
 from core.overlay import Overlays, Polyline
 from tools.brush import BrushStroke
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import BrushParams, ring_strength
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 FULL_TILT = math.radians(60.0)  # what pens report at the most
 STEEPEST = 1.3  # radians, what the kernel takes

@@ -23,12 +23,13 @@ from core.posed import field_at, field_known, skin_at
 from core.transform import normalized
 from core.workspace import Respect
 from tools.craft import Work
+from tools.ground import Hit, Pointer, Sight
 from tools.map_edits import map_to_paint, paint_map
 from tools.posed_guides import BackToRest, in_pose
 from tools.respect import Edits, respected, restored
 from tools.screen import Screen
 from tools.skin_ground import SkinGround
-from tools.tool import Hit, Pointer, Sight, Tool
+from tools.tool import Tool
 
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])  # across the object's own X = 0 plane
 

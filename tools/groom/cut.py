@@ -14,8 +14,9 @@ from core.groom.region import editable
 from core.overlay import Overlays, Polyline
 from tools.brush import BrushStroke, on_rows
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import ReachParams, ring_overlays
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 SHORTEST = 1e-4  # of the animal's diagonal
 

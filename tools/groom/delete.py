@@ -11,8 +11,9 @@ from core.groom.delete import delete
 from core.groom.guides import Guides
 from tools.brush import BrushStroke
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import ReachParams
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 
 class DeleteParams(ReachParams):

@@ -11,8 +11,9 @@ from core.groom.freeze import freeze, unfreeze
 from core.groom.guides import Guides
 from tools.brush import BrushStroke
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import ReachParams
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class FreezeParams(ReachParams):

@@ -9,8 +9,9 @@ from core.groom.guides import Guides
 from core.groom.hairspray import spray
 from tools.brush import BrushStroke, on_rows
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import BrushParams
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 PASS = 2.0  # hold that a way of one radius adds at strength 1: a pass locks what the inner half of the ring goes over
 

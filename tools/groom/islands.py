@@ -13,7 +13,8 @@ from core.mesh.surface import root_vertices
 from core.overlay import Overlays
 from core.record import Record
 from tools.groom.craft import GroomGround, nothing_to_do
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.ground import Pointer
+from tools.tool import Stroke, Tool, Turn
 
 
 class IslandsParams(Record):

@@ -13,7 +13,8 @@ from core.groom.select import select_in_lasso
 from core.overlay import Overlays, Polyline
 from core.record import Record
 from tools.groom.craft import GroomGround, nothing_to_do
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.ground import Pointer
+from tools.tool import Stroke, Tool, Turn
 
 
 class LassoParams(Record):

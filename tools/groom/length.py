@@ -11,8 +11,9 @@ from core.groom.guides import Guides
 from core.groom.length import lengths, set_length
 from tools.brush import BrushStroke, on_rows
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import BrushParams
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 RATE = 0.25  # at strength 1 hair grows by exp of this on a way of one radius: half as long again in a pass over it
 APPROACH = 3.0  # and comes to within exp of minus this of a length

@@ -12,7 +12,8 @@ from core.overlay import Label, Marker, Overlays, Polyline
 from core.record import Record
 from core.units import METRES_PER_UNIT
 from tools.groom.craft import GroomGround
-from tools.tool import Hit, Pointer, Stroke, Tool
+from tools.ground import Hit, Pointer
+from tools.tool import Stroke, Tool
 
 PICK = 12.0  # pixels around the pointer within which a hair is found
 

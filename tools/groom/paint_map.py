@@ -16,9 +16,10 @@ from core.pose.sculpt.surface import SculptSurface, sculpt_surface
 from core.record import freeze
 from tools.brush import RingStroke
 from tools.groom.craft import GroomGround
+from tools.ground import Pointer
 from tools.ring import BrushParams
 from tools.screen import FLAT
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 PASS = 4.0  # share of the way to the value that a way of one radius goes at strength 1: a pass is all of it
 SOFTENED = 2  # times a dab takes the mean of neighbours

@@ -14,8 +14,9 @@ from core.groom.rows import append_guides
 from core.overlay import Marker, Overlays
 from core.record import Record
 from tools.groom.craft import GroomGround
+from tools.ground import Pointer
 from tools.places import directions_at_rest, places_under
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 STEP = 2.0  # pixels between the places that are tried along a drag
 BACK = 10.0  # pixels of the way that tell the direction of a drag

@@ -17,9 +17,10 @@ from core.groom.plant import plant, plant_scatter
 from core.groom.rows import append_guides
 from core.overlay import Overlays
 from tools.groom.craft import GroomGround
+from tools.ground import Pointer
 from tools.places import Places, places_under
 from tools.ring import RingParams, ring_overlays, ring_radius
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 SPACING = 0.015  # of the animal's diagonal, where none is given
 TRIES = 6.0  # places tried for each that would fit

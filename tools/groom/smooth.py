@@ -17,8 +17,9 @@ from core.mesh.surface import root_positions
 from core.record import freeze
 from tools.brush import BrushStroke
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import BrushParams
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class SmoothParams(BrushParams):

@@ -6,8 +6,9 @@ from core.groom.guides import Guides
 from core.groom.hairspray import wash
 from tools.brush import BrushStroke, on_rows
 from tools.groom.craft import GroomGround, nothing_to_do
+from tools.ground import Pointer
 from tools.ring import BrushParams
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 PASS = 2.0  # hold that a way of one radius takes away at strength 1
 

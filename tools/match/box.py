@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from core.errors import UserError
 from core.match.track import TrackSettings, keyed_track
 from core.overlay import Overlays, Polyline
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
 from tools.match_edits import free_track, with_track
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 SMALLEST, LARGEST = 7, 201  # pixels of the plate
 

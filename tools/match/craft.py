@@ -19,8 +19,9 @@ from core.match.outline import Mask
 from core.match.photomodel.records import Photomodel
 from core.match.track import PlaneTrack, Track
 from tools.craft import Work
+from tools.ground import Ground, Pointer, Sight
 from tools.match_edits import place_at, shown_plate
-from tools.tool import Ground, Pointer, Sight, Tool
+from tools.tool import Tool
 
 Array = NDArray[np.float64]
 REACH = 10.0  # pixels of the view from a track that a press takes hold of it

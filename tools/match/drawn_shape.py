@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from core.field import field
 from core.overlay import Overlays, Polyline, Tone
 from core.record import Record
+from tools.ground import Pointer
 from tools.match.craft import MatchGround
-from tools.tool import Pointer
 
 LEAST = 3  # points of a shape
 

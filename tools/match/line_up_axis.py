@@ -12,10 +12,11 @@ from core.field import field
 from core.match.photomodel.records import Known, ModelPoint, Photo, Photomodel, picked
 from core.overlay import Overlays, Polyline, Tone
 from core.record import Record
+from tools.ground import Pointer
 from tools.match.craft import Array, Marks, MatchGround
 from tools.match.picks import inside, model_here
 from tools.photomodel_edits import with_model
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 SHORTEST = 12.0  # pixels of the view
 AXES: dict[str, tuple[int, tuple[float, float, float]]] = {

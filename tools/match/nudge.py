@@ -9,9 +9,10 @@ from core.field import field
 from core.match.edits import key_track
 from core.overlay import Overlays
 from core.record import Record
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
 from tools.match_edits import place_at, with_track
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 
 class NudgeParams(Record):

@@ -6,10 +6,11 @@ from typing import Annotated
 
 from core.field import field
 from core.overlay import Overlays
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
 from tools.match.picks import MovePick, PickParams, added, inside, model_here, pick_near, ring_about
 from tools.photomodel_edits import with_circle
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class CirclePickParams(PickParams):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from core.errors import UserError
 from core.overlay import Overlays
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
 from tools.match.picks import MovePick, PickParams, added, inside, model_here, pick_near, ring_about
 from tools.photomodel_edits import points_in_hand, with_line
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class EdgePickParams(PickParams):

@@ -8,11 +8,12 @@ from core.document import free_id
 from core.field import field
 from core.match.photomodel.records import ModelPoint
 from core.overlay import Overlays
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
 from tools.match.picks import MovePick, PickParams, added, inside, model_here, pick_near, ring_about
 from tools.match_edits import selected_with
 from tools.photomodel_edits import active_point, with_model
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class PointPickParams(PickParams):

@@ -14,10 +14,10 @@ from core.field import field
 from core.match.photomodel.records import Photo, Photomodel, Picked, find
 from core.overlay import Circle, Overlay, Overlays
 from core.record import Record
+from tools.ground import Pointer
 from tools.match.craft import REACH, Array, Marks, MatchGround
 from tools.match.point import STILL
 from tools.photomodel_edits import photo_of, with_model, with_photo, working_model
-from tools.tool import Pointer
 
 Kind = Literal["points", "lines", "circles"]
 

@@ -10,8 +10,9 @@ from core.errors import UserError
 from core.match.track import PlaneTrack, TrackSettings, drawn_plane
 from core.overlay import Circle, Overlays, Polyline
 from core.record import freeze
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 Array = NDArray[np.float64]
 REACH, SMALLEST = 9.0, 9.0  # pixels of the view; of the plate

@@ -12,9 +12,10 @@ from core.field import field
 from core.match.edits import key_track
 from core.match.track import Track, TrackSettings, keyed_track
 from core.overlay import Circle, Overlays, Polyline
+from tools.ground import Pointer
 from tools.match.craft import REACH, Marks, MatchGround, track_near
 from tools.match_edits import free_track, place_at, selected_with, with_track
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 STILL = 2.0  # pixels of the view that a hand may shake in a click
 

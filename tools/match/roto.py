@@ -12,9 +12,10 @@ from core.field import field
 from core.match.outline import Mask, key_mask, outline_at
 from core.overlay import Circle, Overlays
 from core.record import freeze
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround
 from tools.match.drawn_shape import ShapeParams, Way
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 REACH = 9.0  # pixels of the view
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from core.overlay import Label, Marker, Overlays, Polyline
 from core.record import Record
+from tools.ground import Pointer
 from tools.match.craft import Marks, MatchGround, track_near
 from tools.match_edits import place_at
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 
 class RulerParams(Record):

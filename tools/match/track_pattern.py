@@ -10,12 +10,13 @@ from core.errors import UserError
 from core.match.track import Track, TrackSettings
 from core.overlay import Circle, Overlays
 from core.record import freeze
+from tools.ground import Pointer
 from tools.match.box import LARGEST, SMALLEST
 from tools.match.craft import Marks, MatchGround
 from tools.match.drawn_shape import ShapeParams, Way
 from tools.match.point import SQUARE
 from tools.match_edits import place_at, with_track
-from tools.tool import Pointer, Stroke, Tool
+from tools.tool import Stroke, Tool
 
 Array = NDArray[np.float64]
 REACH = 9.0  # pixels of the view

@@ -22,10 +22,11 @@ from core.pose.sculpt.symmetry import reflected
 from core.posed import held_points
 from core.record import freeze
 from tools.brush import RingStroke
+from tools.ground import Hit, Pointer
 from tools.pose.craft import Points, PoseGround
 from tools.pose_edits import pose_named
 from tools.ring import BrushParams, ring_radius, ring_strength
-from tools.tool import Hit, Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 RISE = 0.15  # of the radius, what one radius of way raises at full strength
 

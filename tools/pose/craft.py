@@ -27,9 +27,10 @@ from core.posed import held_points, skin_at
 from core.record import freeze
 from core.workspace import Respect
 from tools.craft import Work
+from tools.ground import Hit, Sight
 from tools.pose_edits import add_sculpt, same_pose, sculpt_name
 from tools.skin_ground import SkinGround
-from tools.tool import Hit, Sight, Tool
+from tools.tool import Tool
 
 Points = NDArray[np.float32]
 Way = Literal["topology", "axis"]

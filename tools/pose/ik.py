@@ -12,6 +12,7 @@ from core.overlay import Marker, Overlays, Polyline
 from core.pose.ik import chain_to, solved_ik
 from core.pose.pose import Pose
 from core.transform import Array
+from tools.ground import Pointer
 from tools.pose.craft import PoseGround, Posing
 from tools.pose.posing import (
     Joints,
@@ -24,7 +25,7 @@ from tools.pose.posing import (
     selected_with,
     towards_eye,
 )
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class IkParams(ManipulatorParams):

@@ -11,9 +11,10 @@ from core.field import field
 from core.pose.sculpt.mask import blur_mask, paint_mask
 from core.pose.sculpt.ring import Ring
 from core.record import freeze
+from tools.ground import Pointer
 from tools.pose.brushes import SculptParams, SculptStroke
 from tools.pose.craft import PoseGround
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class MaskParams(SculptParams):

@@ -11,6 +11,7 @@ from core.overlay import Circle, Label, Overlay, Overlays, Polyline, Tone
 from core.pose.pose import SAME, Pose, Vector
 from core.transform import Array
 from core.units import METRES_PER_UNIT
+from tools.ground import Pointer
 from tools.pose.craft import PoseGround, Posing
 from tools.pose.posing import (
     AXES,
@@ -32,7 +33,7 @@ from tools.pose.posing import (
     towards_eye,
     with_handles,
 )
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 FREE = 3  # the handle in the middle: across the line of sight
 HEAD = 16.0  # pixels of the head of an arrow

@@ -17,8 +17,8 @@ from core.pose.rotation import polar_rotation
 from core.pose.skinning import object_matrices
 from core.record import Record
 from core.transform import Array
+from tools.ground import Hit, Pointer
 from tools.pose.craft import PoseGround, Posing
-from tools.tool import Hit, Pointer
 
 JOINT = 14.0  # pixels within which a pointer means a joint
 HANDLE = 9.0  # the same of a ring or an arrow

@@ -12,6 +12,7 @@ from core.overlay import Circle, Label, Overlay, Overlays, Polyline, Tone
 from core.pose.ik import turned_joint
 from core.pose.pose import Pose, local_of_pose, pose_of_local
 from core.transform import Array, matrix_from_quaternion, normalized, quaternion_about
+from tools.ground import Pointer
 from tools.pose.craft import PoseGround, Posing
 from tools.pose.posing import (
     AXES,
@@ -33,7 +34,7 @@ from tools.pose.posing import (
     towards_eye,
     with_handles,
 )
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 STEPS = 64  # of a ring that is drawn
 EDGE_ON = 0.17  # cosine between a ring's axis and the line of sight below which the ring is pulled along, not round

@@ -17,9 +17,10 @@ from core.pose.skeleton import SkinWeights
 from core.pose.weights import painted, smoothed
 from core.record import freeze
 from tools.brush import RingStroke
+from tools.ground import Pointer
 from tools.pose.brushes import SculptParams
 from tools.pose.craft import PoseGround
-from tools.tool import Pointer, Stroke, Tool, Turn
+from tools.tool import Stroke, Tool, Turn
 
 
 class WeightParams(SculptParams):

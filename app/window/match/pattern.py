@@ -14,8 +14,8 @@ from core.document import Document
 from core.image.plate_view import plate_points
 from core.match.track import Track, TrackSettings
 from core.overlay import Label, Marker, Overlay, Overlays, Polyline
+from tools.ground import Pointer
 from tools.match_edits import place_at, selected_tracks
-from tools.tool import Pointer
 from viewport.plate import Inset
 
 SIDE, GAP = 132.0, 10.0  # pixels of Qt's

@@ -24,10 +24,10 @@ from app.window.match.tracking import MatchTracking
 from core.image.plate_view import pixels_per_pixel, plate_size
 from core.match.track import errors_of
 from core.overlay import Fill, Overlays, Polyline
+from tools.ground import Pointer
 from tools.match_edits import place_at, selected_tracks
 from tools.photomodel_edits import model_of, photo_of
 from tools.solve_edits import solved_of
-from tools.tool import Pointer
 from viewport.plate import Box, PlatePicture
 from viewport.view import HudLine, View3D
 
