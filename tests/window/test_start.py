@@ -123,7 +123,7 @@ def test_killed_amidst_work_the_next_start_offers_it_and_brings_it_back(home: Pa
     work = home / "work.py"
     work.write_text(
         "import time\n"
-        "from tools.tool import Pointer, Sight\n"
+        "from tools.ground import Pointer, Sight\n"
         "view = window.viewport\n"
         "width, height = view.pixels()\n"
         "points = tuple(Pointer(0.5 * width + 6 * i, 0.45 * height) for i in range(9))\n"
