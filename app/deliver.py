@@ -108,16 +108,14 @@ def draw(
     camera: Camera | None = None, feathers: tuple[FeatherMesh, ...] = (),
 ) -> None:
     """Draw the document's meshes and coats into a PNG, at rest or in the pose of `skins`, from a side or a camera."""
-    from viewport.document_scene import scene_of, under_feathers  # GL is loaded only when a picture is asked for
+    from viewport.document_scene import feathered, scene_of  # GL is loaded only when a picture is asked for
 
     shown = posed_document(document, None, evaluator) if skins is None else skins
     first = next(iter(shown.values()), None)
     direction = VIEWS[view] if first is None else turned_view(VIEWS[view], first)
     scene = scene_of(document, shown, children)
     if feathers:
-        skin = under_feathers(feathers)
-        scene = scene._replace(
-            feathers=feathers, surfaces=tuple(s._replace(color=skin) for s in scene.surfaces))
+        scene = feathered(scene, document, shown, feathers)
     _picture(path, scene, size, direction, camera)
 
 

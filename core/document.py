@@ -275,6 +275,10 @@ def problems(document: Document) -> list[str]:
                 found.append(f"{owner} has a root on a face that its mesh does not have.")
             elif roots.corners.min() < 0 or np.any(roots.corners >= mesh.counts[roots.faces][:, None]):
                 found.append(f"{owner} has a root on a corner that its face does not have.")
+    for coat in document.feathers:
+        vertices = len(find_mesh(document, coat.mesh_id).mesh.points)
+        if any(anchor.vertices.max() >= vertices for wing in coat.wings for anchor in wing.anchors):
+            found.append(f"A wing of the coat {coat.name!r} stands on a vertex that its mesh does not have.")
     for groom in document.grooms:
         mesh = find_mesh(document, groom.mesh_id).mesh
         for item in groom.maps:

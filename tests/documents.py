@@ -10,6 +10,7 @@ from core.camera import Camera
 from core.curve import Curve, Key
 from core.document import Document, MeshObject, with_feathers, with_groom
 from core.feather.coat.coat import AttributeValue, FeatherCoat, KeyAttributes, Placement, Proxy, Stroke, Tract
+from core.feather.coat.wing import Anchor, Wing, WingOffset, WingRow
 from core.groom.groom import Coat, Groom, Map
 from core.groom.guides import Guides
 from core.image.plate import Plate
@@ -110,9 +111,26 @@ def feathered(document: Document) -> Document:
         proxies=(Proxy(
             id=3, frames=frames, rest=shafts[0].astype(np.float32), shafts=shafts.astype(np.float32),
             rolls=np.zeros(2, np.float32)),),
-        ruffle=formula("0.1 * rand(id, 3)"), length=constant(1.1, "density"),
+        ruffle=formula("0.1 * rand(id, 3)"), length=constant(1.1, "density"), wings=(small_wing(),),
     )
     return with_feathers(document, coat)
+
+
+def small_wing() -> Wing:
+    """A wing of two rows on two anchors of four vertices each, its second feather animated by hand."""
+    anchors = tuple(Anchor(joint=name, vertices=np.arange(4, dtype=np.int32)) for name in ("body", "hand"))
+    ones = np.ones(2, np.float32)
+    places = np.array([[0.2, 0.1, 0.2], [0.8, 0.1, 0.3]], np.float32)
+    rows = tuple(
+        WingRow(
+            id=k, name=part, part=part, count=3, anchors=np.array([0, 1], np.int32), places=places,
+            normals=np.array([[0.0, 1.0, 0.0]] * 2, np.float32), shares=np.array([0.0, 1.0], np.float32),
+            lengths=0.3 * ones / (k + 1), widths=ones, height=0.01 * k, length=formula("0.5 + 0.5 * open"),
+            offsets=(WingOffset(number=2, spread=formula("0.1 * sin(frame)")),))
+        for k, part in enumerate(("primaries", "primary coverts")))
+    return Wing(
+        id=0, name="left", kind="wing", anchors=anchors, rows=rows, inner=0, outer=1,
+        inner_direction=(0.0, 0.0, -1.0), outer_direction=(1.0, 0.0, -0.2))
 
 
 def matched(document: Document) -> Document:

@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.document import Document, visible_grooms
 from core.feather.pieces import FeatherMesh
 from core.groom.children import Children, Traits
 from core.groom.groom import Coat as CoatRecord
 from core.groom.strands import GroomStrands, Strands
+from core.mesh.mesh import Mesh
 from core.mesh.skin import Skin
+from core.record import freeze
 from viewport.scene import Coat, Color, GuideLines, Look, Scene, Surface, mean_width
 
 SKIN = (0.36, 0.35, 0.34)
+# what bare parts of a feathered animal are painted in, by words in their names: linear RGB
+PARTS: dict[str, Color] = {
+    "eye": (0.006, 0.005, 0.005), "beak": (0.56, 0.27, 0.13), "bill": (0.56, 0.27, 0.13), "feet": (0.30, 0.17, 0.12),
+    "foot": (0.30, 0.17, 0.12), "claw": (0.03, 0.025, 0.02), "toe": (0.30, 0.17, 0.12),
+}
 DRAWN_POINTS = 16
 UNDER = 0.5  # of the colour of feathers: that of the skin they leave bare
 
@@ -107,8 +115,36 @@ def resampled(strands: Strands) -> np.ndarray:
     return np.ascontiguousarray(first * (1 - share) + strands.points[starts[:, None] + low + 1] * share, np.float32)
 
 
+def feathered(
+    scene: Scene, document: Document, skins: Mapping[int, Skin], feathers: tuple[FeatherMesh, ...]
+) -> Scene:
+    """The scene of a document (``scene_of``) with feathers on its meshes, whose bare parts are painted."""
+    under, surfaces = under_feathers(feathers), []
+    for item, surface in zip((i for i in document.meshes if not i.hidden), scene.surfaces, strict=True):
+        faces = skins[item.id].triangles.faces
+        for color, part in painted_parts(item.mesh, faces, surface.triangles):
+            surfaces.append(surface._replace(color=under if color is None else color, triangles=part))
+    return scene._replace(feathers=feathers, surfaces=tuple(surfaces))
+
+
+def painted_parts(
+    mesh: Mesh, faces: NDArray[np.int32], triangles: NDArray[np.int32]
+) -> tuple[tuple[Color | None, NDArray[np.int32]], ...]:
+    """The triangles (T, 3) of a feathered mesh by what they are painted in: first None, what feathers stand on.
+
+    faces : (T,) int32, of the mesh, that the triangles are parts of.
+    """
+    colors = [next((PARTS[word] for word in PARTS if word in name.lower()), None) for name in mesh.part_names]
+    number = np.array([-1 if color is None else colors.index(color) for color in colors], np.int64)
+    of = number[mesh.parts[faces]] if colors else np.full(len(faces), -1)
+    if (of < 0).all():
+        return ((None, triangles),)
+    return tuple((None if k < 0 else colors[k], freeze(triangles[of == k])) for k in np.unique(of))
+
+
 def under_feathers(meshes: Iterable[FeatherMesh]) -> Color:
     """What skin between feathers is painted in: as dark as what lies under them."""
-    means = [mesh.colors.mean(axis=0) for mesh in meshes if len(mesh.colors)]
-    red, green, blue = (UNDER * float(v) for v in np.mean(means, axis=0)) if means else (0.1, 0.1, 0.1)
+    known = [mesh for mesh in meshes if len(mesh.colors)]
+    means, share = [mesh.colors.mean(axis=0) for mesh in known], [len(mesh.colors) for mesh in known]
+    red, green, blue = (UNDER * float(v) for v in np.average(means, 0, share)) if known else (0.1, 0.1, 0.1)
     return red, green, blue

@@ -45,7 +45,7 @@ from core.groom.maps import at_vertices
 from core.mesh.edges import edge_vertices
 from core.mesh.skin import Posed, skin_at_rest
 from core.workspace import ViewOptions
-from viewport.document_scene import SKIN, look_of, skin_of, under_feathers, widths_of
+from viewport.document_scene import SKIN, look_of, painted_parts, skin_of, under_feathers, widths_of
 from viewport.live_feathers import Asked, FeatherPicture, LiveFeathers
 from viewport.live_guides import LiveGuides
 from viewport.posed_frames import PosedFrames
@@ -340,14 +340,18 @@ class LiveScene:
         for item in self._visible_meshes():
             posed = self._frames.posed(item, self._frame)
             skin = skin_of(looks[item.id]) if item.id in looks else SKIN
-            if item.id in feathers:
-                skin = under_feathers(mesh for picture in feathers[item.id] for mesh in picture.quick)
-            surfaces.append(Surface(
-                posed.points, posed.normals, skin_at_rest(item.mesh, self._evaluator).triangles.vertices,
-                skin, self._map_values(item), "map",
+            triangles = skin_at_rest(item.mesh, self._evaluator).triangles
+            surface = Surface(
+                posed.points, posed.normals, triangles.vertices, skin, self._map_values(item), "map",
                 item.id in options.ghosted, self._evaluator.get(edge_vertices, item.mesh) if options.edges else None,
                 item.id in looks,
-            ))
+            )
+            if item.id not in feathers:
+                surfaces.append(surface)
+                continue
+            skin = under_feathers(mesh for picture in feathers[item.id] for mesh in picture.quick)
+            for color, part in self._evaluator.get(painted_parts, item.mesh, triangles.faces, triangles.vertices):
+                surfaces.append(surface._replace(triangles=part, color=skin if color is None else color))
         pictures = [picture for found in feathers.values() for picture in found]
         return Scene(
             tuple(surfaces), tuple(coats), tuple(lines), feathers=tuple(m for p in pictures for m in p.fine),

@@ -25,10 +25,11 @@ from core.groom.grow import grow
 from core.mesh.skin import Skin
 
 POSE_FRAMES = (1001, 1017, 1045, 1065)
+BIRD_FRAMES = (1001, 1014, 1022)
 
 
 def command(
-    what: Annotated[str | None, typer.Argument(help="pose for the demo of pose space, match for that of matchmove; without a word, the groomed animal.", show_default=False)] = None,
+    what: Annotated[str | None, typer.Argument(help="bird for the demo of feathers, pose for that of pose space, match for that of matchmove; without a word, the groomed animal.", show_default=False)] = None,
     mesh: Annotated[Path | None, typer.Option(help="Another animal than the demo's.")] = None,
     folder: Annotated[Path, typer.Option(help="Where the files go.")] = Path("out"),
     hairs: Annotated[int, typer.Option(min=0, max=20_000_000, help="Hairs to grow.")] = 120_000,
@@ -36,12 +37,15 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Write the demo and open it: a groomed animal (demo.filo, .usdc, .png); with pose an arm and a face (pose.filo,
-    .png); with match a dark plate, tracked and solved: camera, head and neck (match.filo, .usda, .jpg)."""
-    if what not in (None, "pose", "match"):
-        raise typer.BadParameter(f"there is no demo {what}; say pose, match, or nothing for the animal")
+    .png); with bird a finch in feathers whose wings fold (bird.filo, .usdc, .png) and the same one bare, to be dressed
+    (bare-bird.filo); with match a dark plate, tracked and solved: camera, head and neck (match.filo, .usda, .jpg)."""
+    if what not in (None, "bird", "pose", "match"):
+        raise typer.BadParameter(f"there is no demo {what}; say bird, pose, match, or nothing for the animal")
     folder.mkdir(parents=True, exist_ok=True)
     if what == "match":
         _match(folder, as_json)
+    elif what == "bird":
+        _bird(folder, as_json)
     elif what == "pose":
         _pose(folder, as_json)
     else:
@@ -67,6 +71,30 @@ def _animal(folder: Path, mesh: Path | None, hairs: int, as_json: bool) -> None:
             draw(folder / "demo.png", document, children, evaluator)
     outputs = [*map(str, files), str(folder / "demo.png")]
     report.done({"outputs": outputs, "seconds": report.seconds}, ["the demo animal has its coat:", *outputs])
+
+
+def _bird(folder: Path, as_json: bool) -> None:
+    from core.demo.bird_document import bare_bird_document, bird_document
+
+    report, evaluator = Report(as_json), Evaluator()
+    bare, dressed, coat = folder / "bare-bird.filo", folder / "bird.filo", folder / "bird.usdc"
+    pictures = [(folder / f"bird-{frame}.png", frame) for frame in BIRD_FRAMES]
+    with report.working(total=5 + len(pictures)):
+        document = bird_document(evaluator, stage=report.stage)
+        with report.stage("export_filo", f"writing {dressed}"):
+            write_project(bare, bare_bird_document())
+            write_project(dressed, document)
+        with report.stage("export_usdc", f"writing {coat}"):
+            found = write_feathers(coat, document, document.feathers[0], None, True, evaluator)
+        for path, frame in pictures:
+            with report.stage("export_picture", f"drawing {path.name}"):
+                skins = posed_document(document, float(frame), evaluator)
+                feathers = feather_meshes(document, skins, float(frame), evaluator)
+                draw(path, document, {}, evaluator, skins=skins, feathers=feathers)
+    outputs = [str(bare), str(dressed), str(coat), *(str(path) for path, _ in pictures)]
+    report.done(
+        {**found, "outputs": outputs, "seconds": report.seconds},
+        [f"a finch in {found['feathers']:,} feathers:", *outputs, f"the window opens it: filoplume {dressed}"])
 
 
 def draw_poses(path: Path, document: Document, skins: Mapping[int, Skin], size: tuple[int, int] = (1600, 1000)) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 Raw = dict[str, Any]
 
-FORMAT = 8
+FORMAT = 9
 
 VALUES_OF_2 = ("density", "width_root", "width_tip", "clump", "frizz", "length_variation")  # of a coat; plain before
 
@@ -65,10 +65,15 @@ def feathered_meshes(raw: Raw) -> Raw:
     return raw
 
 
+def winged_coats(raw: Raw) -> Raw:
+    """8 -> 9: coats of feathers may have wings; as none had, nothing is to be changed."""
+    return raw
+
+
 # from version -> pure function on the plain JSON dictionary, giving that of the next version
 UPGRADES: Mapping[int, Callable[[Raw], Raw]] = {
     1: coats_of_values, 2: held_poses, 3: aligned_handles, 4: shaped_tracks, 5: keyed_clips, 6: selected_tracks,
-    7: feathered_meshes}
+    7: feathered_meshes, 8: winged_coats}
 
 
 def upgrade(raw: Raw, upgrades: Mapping[int, Callable[[Raw], Raw]] = UPGRADES, latest: int = FORMAT) -> Raw:

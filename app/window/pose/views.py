@@ -40,6 +40,7 @@ from core.pose.rig import Rig
 from core.pose.synthesis import pose_at, prepare
 from core.posed import shown_points
 from core.record import freeze
+from viewport.document_scene import painted_parts
 from viewport.legend import Legend
 from viewport.panes import Pane
 from viewport.scene import Scene, Surface
@@ -102,8 +103,12 @@ class PoseViews(QObject):
         item, methods = self.desk.posed, self.methods
         if item is None or item.rig is None or (not methods and self.heat is None):
             return (Pane(scene),)
-        triangles = skin_at_rest(item.mesh, self.desk.session.evaluator).triangles.vertices
-        at = next((i for i, s in enumerate(scene.surfaces) if s.triangles is triangles), None)
+        evaluator = self.desk.session.evaluator
+        triangles = skin_at_rest(item.mesh, evaluator).triangles
+        feathered = evaluator.get(painted_parts, item.mesh, triangles.faces, triangles.vertices)[0][1]
+        at = next((
+            i for i, s in enumerate(scene.surfaces) if s.triangles is triangles.vertices or s.triangles is feathered
+        ), None)
         if at is None:
             return (Pane(scene),)
         surface = scene.surfaces[at]

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from core.feather.coat.wing import Wing
 from core.feather.dials import DIAL_NAMES
 from core.feather.presets import bird_names
 from core.field import field, fields_of
@@ -171,6 +172,7 @@ class FeatherCoat(Record):
     dials: tuple[DialTurn, ...] = ()
     key_attributes: KeyAttributes | None = None
     proxies: tuple[Proxy, ...] = ()
+    wings: tuple[Wing, ...] = ()
     direction: Annotated[str, field(
         "Direction", "What says which way feathers lie: the combed keys, the body's flow, strokes, or its curvature.",
         choices=DIRECTIONS,
@@ -250,6 +252,8 @@ class FeatherCoat(Record):
                 raise ValueError(f"FeatherCoat.{name} holds two of the same name")
         if len({proxy.id for proxy in self.proxies}) != len(self.proxies):
             raise ValueError("FeatherCoat.proxies holds two of one feather")
+        if len({wing.id for wing in self.wings}) != len(self.wings):
+            raise ValueError("FeatherCoat.wings holds two of the same id")
         named = {tract.name for tract in self.tracts}
         for placement in self.placements:
             if placement.tract is not None and placement.tract not in named:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
-from core.feather.coat.plumage import Laid
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.feather.coat.winged import Laid
 from core.workers import Workers
 
 STEPS = np.array([0.08, 0.12, 0.10])  # radians over the length of a feather, of bend, cup and twist

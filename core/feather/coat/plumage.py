@@ -7,7 +7,7 @@ carrying. Nothing here reads another frame.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import LENGTH, pose_vanes
 from core.feather.coat.proxy import apply_proxies
+from core.feather.coat.wing_pose import wings_move
+from core.feather.coat.winged import COLUMNS, ROWS, Laid, winged
 from core.feather.coat.worn import for_all, worn_values
 from core.feather.presets import load_bird
 from core.feather.vane import SHAPE_COLUMNS, vane_grids
@@ -49,25 +51,8 @@ from core.mesh.skin import Skin, skin_at_rest
 from core.random import rand
 from core.value import Formula, Value, evaluate_within, names_used
 
-ROWS, COLUMNS = 8, 5  # of a vane as it is layered
 STANDING = 0.28  # radians, lift of feathers without keys
 SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
-
-
-class Laid(NamedTuple):
-    """A coat at one frame, the rows those of the bed.
-
-    ids : (N,) int32. shown : (N,) bool, what density keeps. layered : poses, vanes, boxes.
-    feathers : vanes at length 1, roots, frames. skin : the skin in the same pose.
-    """
-
-    ids: NDArray[np.int32]
-    shown: NDArray[np.bool_]
-    layered: Layered
-    feathers: Feathers
-    bed: Bed
-    skin: Skin
-    fields: dict[str, Any]
 
 
 class Plumage:
@@ -85,11 +70,15 @@ class Plumage:
     def at_rest(
         self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, frame: float = 1001.0, quick: bool = False
     ) -> Laid:
-        """The coat on the mesh at rest, without what proxies do; animated values as at `frame`.
+        """The coat on the mesh at rest, without what proxies do; animated values as at `frame`. Feathers of wings come
+        after all others.
 
         quick : while an artist works: only feathers that changed since the last call, and those over them, settle
             anew. What is kept or written never depends on what was there before.
         """
+        return self._winged(coat, mesh, self._at_rest(coat, keys, mesh, frame, quick), frame)
+
+    def _at_rest(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, frame: float, quick: bool = False) -> Laid:
         bed, binding = self.bed(coat, keys, mesh), self._binding(coat, keys, mesh)
         full = self._memory.get("layer")
         quick = quick and full is not None
@@ -107,10 +96,10 @@ class Plumage:
         self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh, skin: Skin, frame: float, rest_frame: float = 1001.0
     ) -> Laid:
         """The coat on `skin`, the mesh as it is posed at `frame`, from the order and the settling at rest."""
-        rest = self.at_rest(coat, keys, mesh, rest_frame)
+        rest = self._at_rest(coat, keys, mesh, rest_frame)
         still = skin.points is mesh.points and not moving(coat)
         if still and not coat.proxies:
-            return rest
+            return self._winged(coat, mesh, rest, frame)
         bed, workers = rest.bed, self._evaluator.workers
         resting: Base = self._memory["base"][1]
         base, layered = resting, rest.layered
@@ -125,7 +114,7 @@ class Plumage:
         if coat.proxies:
             frames = self.root_frames(coat, keys, mesh, skin)
             layered = apply_proxies(coat, rest.ids, base.feathers, frames, layered, frame, skin.bvh, workers)
-        return self._laid(coat, bed, layered, base, skin, frame)
+        return self._winged(coat, mesh, self._laid(coat, bed, layered, base, skin, frame), frame)
 
     def bed(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh) -> Bed:
         """Where the feathers of a coat stand."""
@@ -134,6 +123,16 @@ class Plumage:
             "bed", lambda: make_bed(coat, mesh, place_feathers(coat, mesh, maps, self._evaluator), self._evaluator),
             mesh, coat.placements, coat.tracts, maps,
         )
+        return made
+
+    def _winged(self, coat: FeatherCoat, mesh: Mesh, laid: Laid, frame: float) -> Laid:
+        """The coat with the feathers of its wings, which lie where they lie; those around make way."""
+        if not coat.wings:
+            return laid
+        by_itself = frame if wings_move(coat.wings) else None
+        made: Laid = self._remember(
+            "wings", lambda: winged(coat, mesh, laid, frame, self._evaluator), coat, mesh, laid.layered,
+            laid.skin.points, by_itself)
         return made
 
     # -- stages --------------------------------------------------------------------------------------------
@@ -357,7 +356,7 @@ def _same(a: Any, b: Any) -> bool:
 
 LOOKS = tuple(
     name for name in FeatherCoat.__struct_fields__
-    if name not in ("id", "name", "proxies", "density", "layered", "hidden", "locked")
+    if name not in ("id", "name", "proxies", "wings", "density", "layered", "hidden", "locked")
 )
 
 
@@ -374,7 +373,7 @@ def moves(value: Value) -> bool:
 def moving(coat: FeatherCoat) -> bool:
     """True when anything of a coat depends on the frame by itself."""
     given = [item.value for item in coat.attributes] + [getattr(coat, name) for name in FEATHER_VALUES]
-    return any(moves(value) for value in given)
+    return any(moves(value) for value in given) or wings_move(coat.wings)
 
 
 def _unlayered(feathers: Feathers, poses: NDArray[np.float64], ranges: Any) -> Layered:

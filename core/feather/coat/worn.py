@@ -17,9 +17,25 @@ def for_all(item: AttributeValue) -> bool:
     return isinstance(item.value.base, Constant) and item.value.map is None
 
 
+# what a part of a wing wears where the bird does not say: as another part of it
+LIKE = {
+    "tertials": "secondaries", "alula": "primary coverts", "primary coverts": "greater coverts",
+    "greater coverts": "median coverts", "median coverts": "lesser coverts", "lesser coverts": "back",
+    "scapulars": "back", "tail coverts": "back",
+}
+
+
+def parts_of(coat: FeatherCoat) -> tuple[str, ...]:
+    """Parts of the bird by the number that the column ``tract`` of a laid coat has: body, tracts, parts of wings."""
+    parts = sorted({row.part for wing in coat.wings for row in wing.rows})
+    return ("body", *(tract.name for tract in coat.tracts), *parts)
+
+
 def worn_preset(coat: FeatherCoat, part: str = "body") -> str:
-    """The preset of the coat's bird on a part of it; that of its body where it has no such part."""
+    """The preset of the coat's bird on a part of it; that of its body where it has no such part, nor one it is like."""
     worn = load_bird(coat.preset).feathers
+    while part not in worn and part in LIKE:
+        part = LIKE[part]
     return worn.get(part, worn["body"])
 
 

@@ -1,0 +1,277 @@
+"""Feathers for the wings and the tail of a rig: rows measured by the bones, as those of a small perching bird.
+
+From the body outward stand tertials on the upper arm, secondaries on the forearm and primaries on the hand; over their
+quills lie greater, median and lesser coverts in one row each from the shoulder to the finger, so that the rows of the
+wing run on into those of the back; below them coverts of the underside; on the thumb the alula.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import UserError
+from core.feather.coat.wing import Anchor, Wing, WingRow
+from core.mesh.mesh import Mesh
+from core.pose.rig import Rig
+from core.record import freeze
+from core.transform import normalized
+from core.value import constant, formula
+
+Array = NDArray[np.float64]
+
+BONES = {
+    "humerus": r"humerus|upper_?arm|up_?arm", "forearm": r"fore_?arm|ulna|radius|lower_?arm|elbow",
+    "hand": r"hand|manus|carp|wrist",
+}
+TAIL = r"tail|pygostyle"
+PATCH = 48  # vertices of an anchor at most
+STIFF = 0.9  # share of its joint that a vertex of an anchor needs at least, where enough have it
+
+RISING = 0.16  # by which the innermost feathers point up from the wing, so that they lie on the back when it folds
+DROP = 0.012  # of the arm, from one bone to the next, by which feathers outward lie lower than those they stand beside
+FOLDED_AWAY = "0.3 + 0.7 * clamp(open, 0, 1)"  # of their length is left of feathers below a folded wing
+
+
+class Plan(NamedTuple):
+    """A row as it is measured by the bones: lengths are in those of the whole arm, angles in degrees.
+
+    begin, end : on the bones, 0 the shoulder, 1 the elbow, 2 the wrist, 3 the finger tip; below 0 on the body.
+    before : how far before the bones. shares, lengths, widths : from the body outward. height : above the bones.
+    """
+
+    name: str
+    part: str
+    many: int
+    begin: float
+    end: float
+    before: float
+    shares: tuple[float, ...]
+    lengths: tuple[float, ...]
+    widths: tuple[float, ...]
+    height: float
+    follow: float
+    lift: float = 0.0
+    bend: float = 0.0
+    below: bool = False
+
+
+ROWS = (
+    Plan("tertials", "tertials", 3, 0.3, 0.95, -0.03, (0.0, 0.03), (0.5, 0.66), (1.5, 1.45), 0.0, 1.0),
+    Plan("secondaries", "secondaries", 9, 1.0, 1.98, -0.03, (0.05, 0.34), (0.8, 0.88), (1.35, 1.25), 0.0, 1.0),
+    Plan("primaries", "primaries", 9, 2.06, 2.97, -0.012, (0.39, 0.68, 1.0), (0.92, 1.1, 1.04), (1.15, 1.0, 0.85), 0.0,
+         1.0),
+    Plan("primary coverts", "primary coverts", 9, 2.06, 2.94, 0.006, (0.42, 0.68, 1.0), (0.36, 0.34, 0.3), (1.0, 0.9),
+         0.012, 0.95),
+    Plan("greater coverts", "greater coverts", 13, 0.1, 1.98, 0.0, (0.0, 0.12, 0.38), (0.32, 0.4, 0.4), (1.25, 1.2),
+         0.013, 0.92),
+    Plan("alula", "alula", 3, 2.05, 2.3, 0.022, (0.78, 0.95), (0.2, 0.3), (0.8, 0.8), 0.018, 0.9),
+    Plan("median coverts", "median coverts", 15, -0.15, 2.1, 0.022, (0.0, 0.12, 0.42), (0.24, 0.26, 0.24), (1.5, 1.4),
+         0.02, 0.85),
+    Plan("lesser coverts, lower", "lesser coverts", 18, -0.25, 2.35, 0.034, (0.0, 0.15, 0.55), (0.19, 0.19, 0.16),
+         (1.5, 1.5), 0.026, 0.75, 1.0, -2.0),
+    Plan("lesser coverts, upper", "lesser coverts", 20, -0.35, 2.6, 0.044, (0.0, 0.15, 0.6), (0.16, 0.16, 0.13),
+         (1.6, 1.5), 0.026, 0.7, 5.0, -6.0),
+    Plan("marginal coverts", "lesser coverts", 24, -0.45, 2.95, 0.052, (0.0, 0.2, 0.75), (0.13, 0.13, 0.1), (1.6, 1.5),
+         0.012, 0.6, 16.0, -18.0),
+    Plan("greater under coverts", "under coverts", 19, 0.3, 2.9, 0.01, (0.0, 0.25, 1.0), (0.34, 0.36, 0.24), (1.3, 1.2),
+         0.02, 0.95, below=True),
+    Plan("lesser under coverts", "under coverts", 22, 0.1, 2.8, 0.04, (0.0, 0.2, 0.9), (0.2, 0.2, 0.14), (1.6, 1.5),
+         0.026, 0.8, 4.0, -4.0, below=True),
+)
+STEP = 0.0014  # of the arm, from a feather of the tail up to the next
+TAIL_FEATHERS, TAIL_COVERTS = 12, 9
+
+
+class WingBones(NamedTuple):
+    """A wing of a rig: joints of body, upper arm, forearm and hand, and places (4, 3) of shoulder .. finger tip."""
+
+    joints: tuple[int, int, int, int]
+    places: Array
+
+
+def find_wings(mesh: Mesh, rig: Rig) -> list[WingBones]:
+    """The wings of a rig, by the names of its joints: an upper arm, a forearm below it and a hand below that."""
+    names = [name.lower() for name in rig.skeleton.names]
+    found = []
+    for joint, name in enumerate(names):
+        if not re.search(BONES["humerus"], name) or rig.skeleton.parents[joint] < 0:
+            continue
+        forearm = _below(rig, joint, BONES["forearm"])
+        hand = None if forearm is None else _below(rig, forearm, BONES["hand"])
+        if forearm is None or hand is None:
+            continue
+        bind = rig.skeleton.bind[:, :3, 3]
+        moved = mesh.points[_patch(rig, hand, len(mesh.points), 0.4)].astype(np.float64)
+        if not len(moved):
+            continue
+        away = normalized(bind[hand] - bind[forearm])
+        tip = moved[np.argmax((moved - bind[hand]) @ (away + normalized(bind[hand] - bind[joint])))]
+        places = np.stack([bind[joint], bind[forearm], bind[hand], tip])
+        found.append(WingBones((int(rig.skeleton.parents[joint]), joint, forearm, hand), places))
+    return found
+
+
+def dress_wings(mesh: Mesh, rig: Rig) -> tuple[Wing, ...]:
+    """Wings for all arms of a rig that are wings, and a tail for its last joint of the tail.
+
+    Raises
+    ------
+    UserError
+        No joints of the rig are called as those of a wing.
+    """
+    bones = find_wings(mesh, rig)
+    if not bones:
+        raise UserError(
+            "The rig has no wing: name the joints of each wing humerus, forearm and hand, one below the other.")
+    made = [_wing(mesh, rig, one, number) for number, one in enumerate(bones)]
+    tail = _tail(mesh, rig, bones, len(made))
+    return (*made, *(() if tail is None else (tail,)))
+
+
+def _below(rig: Rig, joint: int, pattern: str) -> int | None:
+    """The nearest joint below another whose name has a pattern."""
+    names, parents = rig.skeleton.names, rig.skeleton.parents
+    under = {joint}
+    for other in range(joint + 1, len(names)):
+        if int(parents[other]) in under:
+            if re.search(pattern, names[other].lower()):
+                return other
+            under.add(other)
+    return None
+
+
+def _patch(rig: Rig, joint: int, vertices: int, least: float) -> NDArray[np.int32]:
+    share = np.where(rig.skin.joints == joint, rig.skin.weights, 0.0).sum(axis=1)
+    return np.flatnonzero(share[:vertices] >= least).astype(np.int32)
+
+
+def _anchor(mesh: Mesh, rig: Rig, joint: int, near: Array) -> Anchor:
+    """The stiffest vertices of a joint about a place, spread evenly among them."""
+    share = np.where(rig.skin.joints == joint, rig.skin.weights, 0.0).sum(axis=1)
+    rows = np.flatnonzero(share >= STIFF)
+    if len(rows) < 12:
+        rows = np.argsort(-share, kind="stable")[:12]
+    distance = np.linalg.norm(mesh.points[rows].astype(np.float64) - near, axis=1)
+    rows = rows[np.argsort(distance, kind="stable")][: 6 * PATCH]
+    rows = np.sort(rows[:: max(1, len(rows) // PATCH)][:PATCH])
+    return Anchor(joint=rig.skeleton.names[joint], vertices=freeze(rows.astype(np.int32)))
+
+
+def _wing(mesh: Mesh, rig: Rig, bones: WingBones, number: int) -> Wing:
+    body, arm, forearm, hand = bones.joints
+    places = bones.places
+    size = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    normal, back = _plane(bones)
+    anchors = tuple(
+        _anchor(mesh, rig, joint, places[max(k - 1, 0)]) for k, joint in enumerate((body, arm, forearm, hand)))
+    end = normalized(places[3] - places[2])
+    outer = normalized(end + 0.12 * back)
+    body_way = normalized(places[0] - places[1])
+    rows = tuple(_row(k, row, places, size, normal, back, body_way) for k, row in enumerate(ROWS))
+    name = rig.skeleton.names[arm]
+    return Wing(
+        id=number, name=f"wing of {name}", kind="wing", anchors=anchors, rows=rows, inner=0, outer=3,
+        inner_direction=_triple(back + RISING * normal), outer_direction=_triple(outer))
+
+
+def _plane(bones: WingBones) -> tuple[Array, Array]:
+    """The upper side of a wing and the way back from it, both unit and square to one another."""
+    places = bones.places
+    out = normalized(places[3] - places[0])
+    bent = places[1] - places[0]
+    back = bent - out * (bent @ out)  # the elbow lies behind the line from shoulder to finger
+    if np.linalg.norm(back) < 0.02 * np.linalg.norm(places[3] - places[0]):
+        back = np.array([0.0, 0.0, -1.0])  # where it is straight, away from where animals look
+        back = back - out * (back @ out)
+    back = normalized(back)
+    normal = normalized(np.cross(out, back))
+    if normal[1] < 0.0:  # documents have y up, and a wing's upper side looks there at rest
+        normal = -normal
+    return normal, back
+
+
+def _on_bones(places: Array, at: float, body_way: Array) -> Array:
+    if at <= 0.0:
+        return places[0] - at * body_way * float(np.linalg.norm(places[1] - places[0]))
+    low = min(int(at), 2)
+    return np.asarray(places[low] + (at - low) * (places[low + 1] - places[low]))
+
+
+def _row(number: int, plan: Plan, places: Array, size: float, normal: Array, back: Array, body_way: Array) -> WingRow:
+    begin, end = plan.begin, plan.end
+    # stations beside a joint rather than on it, so that each goes with one bone
+    inside = [k + d for k in (1.0, 2.0) for d in (-0.12, 0.12) if begin < k + d < end]
+    at = np.array(sorted({begin, end, *inside, *([0.0] if begin < 0.0 else [])}))
+    way = (at - begin) / (end - begin)
+    stations = np.stack([_on_bones(places, one, body_way) for one in at]) - plan.before * size * back
+    anchors = np.clip(np.floor(at).astype(int) + 1, 0, 3)
+    shares, lengths, widths = (
+        np.interp(way, np.linspace(0.0, 1.0, len(v)), v) for v in (plan.shares, plan.lengths, plan.widths))
+    return WingRow(
+        id=number, name=plan.name, part=plan.part, count=plan.many, anchors=freeze(anchors.astype(np.int32)),
+        places=freeze(stations.astype(np.float32)),
+        normals=freeze(np.tile(-normal if plan.below else normal, (len(at), 1)).astype(np.float32)),
+        shares=freeze(shares.astype(np.float32)), lengths=freeze((lengths * size).astype(np.float32)),
+        widths=freeze(widths.astype(np.float32)), height=(plan.height + DROP * (3.0 - begin)) * size,
+        step=DROP * (end - begin) / (plan.many - 1) * size, follow=plan.follow,
+        length=formula(FOLDED_AWAY) if plan.below else constant(1.0),
+        lift=constant(float(np.radians(plan.lift))), bend=constant(float(np.radians(plan.bend))),
+    )
+
+
+def _tail(mesh: Mesh, rig: Rig, bones: list[WingBones], number: int) -> Wing | None:
+    """A tail at the last of the joints that are called one, or None."""
+    called = [joint for joint, name in enumerate(rig.skeleton.names) if re.search(TAIL, name.lower())]
+    if not called:
+        return None
+    joint = called[-1]
+    own = mesh.points[_patch(rig, joint, len(mesh.points), 0.6)].astype(np.float64)
+    if len(own) < 4:
+        return None
+    start = rig.skeleton.bind[joint, :3, 3]
+    size = float(np.mean([np.linalg.norm(np.diff(one.places, axis=0), axis=1).sum() for one in bones]))
+    tip = own[np.argmax(np.linalg.norm(own - start, axis=1))]
+    back = normalized(tip - start)
+    across = np.array([1.0, 0.0, 0.0]) - back * back[0]
+    across = normalized(across)
+    normal = normalized(np.cross(across, back))
+    if normal[1] < 0.0:
+        normal = -normal
+    anchor = _anchor(mesh, rig, joint, tip)
+    half = np.radians(13.0)
+    ends = [normalized(np.cos(half) * back + s * np.sin(half) * across) for s in (-1.0, 1.0)]
+    root = tip - 0.05 * size * back + 0.01 * size * normal
+    line = np.stack([root + s * 0.055 * size * across for s in (-1.0, 0.0, 1.0)])
+    line -= np.array([0.02, 0.0, 0.02])[:, None] * size * normal
+
+    def row(
+        k: int, name: str, part: str, count: int, line: Array, lengths: tuple[float, ...], widths: tuple[float, ...],
+        height: float, bend: float, lift: float,
+    ) -> WingRow:
+        return WingRow(
+            id=k, name=name, part=part, count=count, anchors=freeze(np.zeros(3, np.int32)),
+            places=freeze(line.astype(np.float32)), normals=freeze(np.tile(normal, (3, 1)).astype(np.float32)),
+            shares=freeze(np.array([0.0, 0.5, 1.0], np.float32)),
+            lengths=freeze(np.array(lengths, np.float32) * np.float32(size)),
+            widths=freeze(np.array(widths, np.float32)),
+            height=height * size, step=STEP * size, top=0.5, bend=constant(float(np.radians(bend))),
+            lift=constant(float(np.radians(lift))),
+        )
+
+    return Wing(
+        id=number, name=f"tail of {rig.skeleton.names[joint]}", kind="tail", anchors=(anchor,),
+        rows=(
+            row(0, "tail feathers", "tail", TAIL_FEATHERS, line, (1.0, 0.9, 1.0), (0.9, 1.0, 0.9), 0.0, 0.0, 0.0),
+            row(1, "tail coverts", "tail coverts", TAIL_COVERTS, line + 0.05 * size * (0.5 * normal - back),
+                (0.36, 0.46, 0.36), (1.1, 1.2, 1.1), 0.022, -6.0, 0.0),
+        ),
+        inner=0, outer=0, inner_direction=_triple(ends[0]), outer_direction=_triple(ends[1]), middle=0.5,
+    )
+
+
+def _triple(vector: Array) -> tuple[float, float, float]:
+    return float(vector[0]), float(vector[1]), float(vector[2])

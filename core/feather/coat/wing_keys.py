@@ -1,0 +1,46 @@
+"""Keys on the body that lie as the rows of a wing do where they run on into its skin."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.evaluator import Evaluator
+from core.feather.coat.frames import unit
+from core.feather.coat.posing import LENGTH
+from core.feather.coat.wing import Wing
+from core.feather.coat.wing_pose import lay_wings
+from core.mesh.bvh import closest_points
+from core.mesh.mesh import Mesh
+from core.mesh.roots import Roots
+from core.mesh.skin import Skin
+from core.mesh.surface import place_roots
+
+INNERMOST = 2  # feathers of a row that keys stand beside
+COVERTS = "covert"  # rows whose parts are called so lie on the skin
+
+
+class Beside(NamedTuple):
+    """K keys: where they stand, their directions (K, 3) along the skin, and lengths (K,), metres."""
+
+    roots: Roots
+    along: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+
+
+def keys_beside(wings: tuple[Wing, ...], mesh: Mesh, skin: Skin, evaluator: Evaluator) -> Beside:
+    """Keys on the skin below the innermost feathers of all rows of coverts that begin on the body, lying as they do."""
+    chosen = tuple(
+        wing.replace(rows=tuple(row for row in wing.rows if COVERTS in row.part and row.anchors[0] == 0))
+        for wing in wings)
+    laid = lay_wings(chosen, mesh.points, mesh.points, 0.0)
+    first = np.isin(laid.ids & 255, np.arange(INNERMOST))
+    triangle, weights, _ = closest_points(skin.bvh, laid.roots[first], workers=evaluator.workers)
+    found = triangle >= 0
+    roots = place_roots(mesh, skin.triangles, triangle[found], weights[found].astype(np.float32), skin.normals)
+    normals = roots.frames[:, 2].astype(np.float64)
+    along = laid.frames[first][found][:, 1].astype(np.float64)
+    along = unit(along - normals * np.einsum("nc,nc->n", along, normals)[:, None])
+    return Beside(roots, along, laid.poses[first][found][:, LENGTH])
