@@ -14,6 +14,7 @@ from app.commands import groom as groom_command
 from app.commands import window as window_command
 from app.deliver import deliver, draw, posed_document
 from app.display import has_display
+from app.feather_frames import feather_meshes
 from app.report import Report
 from core.camera import frame_points
 from core.demo import demo_document
@@ -37,7 +38,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Write the demo and open it: a groomed animal (demo.filo, .usdc, .png); with pose an arm and a face (pose.filo,
-    .png); with bird a finch in feathers whose wings fold (bird.filo, .usdc, .png) and the same one bare, to be dressed
+    .png); with bird a finch in feathers whose wings fold (bird.filo, .png) and the same one bare, to be dressed
     (bare-bird.filo); with match a dark plate, tracked and solved: camera, head and neck (match.filo, .usda, .jpg)."""
     if what not in (None, "bird", "pose", "match"):
         raise typer.BadParameter(f"there is no demo {what}; say bird, pose, match, or nothing for the animal")
@@ -77,24 +78,24 @@ def _bird(folder: Path, as_json: bool) -> None:
     from core.demo.bird_document import bare_bird_document, bird_document
 
     report, evaluator = Report(as_json), Evaluator()
-    bare, dressed, coat = folder / "bare-bird.filo", folder / "bird.filo", folder / "bird.usdc"
+    bare, dressed = folder / "bare-bird.filo", folder / "bird.filo"
     pictures = [(folder / f"bird-{frame}.png", frame) for frame in BIRD_FRAMES]
-    with report.working(total=5 + len(pictures)):
+    with report.working(total=4 + len(pictures)):
         document = bird_document(evaluator, stage=report.stage)
         with report.stage("export_filo", f"writing {dressed}"):
             write_project(bare, bare_bird_document())
             write_project(dressed, document)
-        with report.stage("export_usdc", f"writing {coat}"):
-            found = write_feathers(coat, document, document.feathers[0], None, True, evaluator)
         for path, frame in pictures:
             with report.stage("export_picture", f"drawing {path.name}"):
                 skins = posed_document(document, float(frame), evaluator)
                 feathers = feather_meshes(document, skins, float(frame), evaluator)
-                draw(path, document, {}, evaluator, skins=skins, feathers=feathers)
-    outputs = [str(bare), str(dressed), str(coat), *(str(path) for path, _ in pictures)]
+                points = np.concatenate([mesh.points for mesh in feathers])
+                camera = frame_points(points, (-0.75, -0.3, -0.6), 1.5)
+                draw(path, document, {}, evaluator, (1500, 1000), skins=skins, camera=camera, feathers=feathers)
+    outputs = [str(bare), str(dressed), *(str(path) for path, _ in pictures)]
     report.done(
-        {**found, "outputs": outputs, "seconds": report.seconds},
-        [f"a finch in {found['feathers']:,} feathers:", *outputs, f"the window opens it: filoplume {dressed}"])
+        {"outputs": outputs, "seconds": report.seconds},
+        ["a finch in its feathers, and the same one bare:", *outputs, f"the window opens it: filoplume {dressed}"])
 
 
 def draw_poses(path: Path, document: Document, skins: Mapping[int, Skin], size: tuple[int, int] = (1600, 1000)) -> None:

@@ -11,8 +11,9 @@ from core.pose.rig import Rig
 from core.record import freeze
 
 BARE = ("eye", "beak", "bill", "feet", "foot", "claw", "toe", "tongue")  # words in the names of parts
-AROUND_EYES = 1.9  # radii of an eye that stay free around it
+AROUND_EYES = 1.6  # radii of an eye that stay free around it
 ARM = 0.4  # share of forearm and hand in a vertex from which the wing's own rows cover it
+STUB = 0.85  # share of the tail in a vertex from which its coverts cover it
 NAME = "feathered"  # of the map
 
 
@@ -32,9 +33,12 @@ def feathered_map(mesh: Mesh, rig: Rig, wings: tuple[Wing, ...]) -> Map | None:
                     middle = points[side].mean(axis=0)
                     radius = np.linalg.norm(points[side] - middle, axis=1).max()
                     bare |= np.linalg.norm(points - middle, axis=1) < AROUND_EYES * radius
-    arms = {anchor.joint for wing in wings if wing.kind == "wing" for anchor in wing.anchors[2:]}
-    joints = [k for k, name in enumerate(rig.skeleton.names) if name in arms]
-    bare |= np.where(np.isin(rig.skin.joints, joints), rig.skin.weights, 0.0).sum(axis=1) > ARM
+    for share, covered in (
+        (ARM, {anchor.joint for wing in wings if wing.kind == "wing" for anchor in wing.anchors[2:]}),
+        (STUB, {anchor.joint for wing in wings if wing.kind == "tail" for anchor in wing.anchors}),
+    ):
+        joints = [k for k, name in enumerate(rig.skeleton.names) if name in covered]
+        bare |= np.where(np.isin(rig.skin.joints, joints), rig.skin.weights, 0.0).sum(axis=1) > share
     if not bare.any():
         return None
     return Map(name=NAME, values=freeze((~bare).astype(np.float32)))

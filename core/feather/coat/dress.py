@@ -13,7 +13,7 @@ from core.falloff import smoothstep
 from core.feather.coat.bare import feathered_map
 from core.feather.coat.coat import FeatherCoat, Placement
 from core.feather.coat.wing_dress import dress_wings, find_wings
-from core.feather.coat.wing_keys import keys_beside
+from core.feather.coat.wing_keys import clear_of, keys_beside
 from core.feather.presets import load_bird
 from core.groom.dress import skin_flow
 from core.groom.flow import Flow
@@ -84,8 +84,11 @@ def dress_feathers(
     smaller = 1.0 - (1.0 - SMALL) * np.einsum("nk,nk->n", where.barycentric, face[corners])
     if wings:
         beside = keys_beside(wings, mesh, skin, evaluator)
-        roots = roots.join(beside.roots)
-        along, smaller = np.concatenate([along, beside.along]), np.concatenate([smaller, beside.lengths / length])
+        places, taken = root_positions(mesh, roots), root_positions(mesh, beside.roots)
+        kept = np.flatnonzero(clear_of(places, taken, beside.lengths))
+        roots = roots.take(kept).join(beside.roots)
+        along = np.concatenate([along[kept], beside.along])
+        smaller = np.concatenate([smaller[kept], beside.lengths / length])
         normals = roots.frames[:, 2].astype(np.float64)
     heading = np.cos(LIFT) * along + np.sin(LIFT) * normals
     steps = np.linspace(0.0, length, POINTS) * smaller[:, None]

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
-from core.feather.coat.wing import Anchor, Wing, WingRow
+from core.feather.coat.tail_dress import anchor_of, as_triple, dress_tail, joint_patch
+from core.feather.coat.wing import Wing, WingRow
 from core.mesh.mesh import Mesh
 from core.pose.rig import Rig
 from core.record import freeze
@@ -27,9 +28,6 @@ BONES = {
     "humerus": r"humerus|upper_?arm|up_?arm", "forearm": r"fore_?arm|ulna|radius|lower_?arm|elbow",
     "hand": r"hand|manus|carp|wrist",
 }
-TAIL = r"tail|pygostyle"
-PATCH = 48  # vertices of an anchor at most
-STIFF = 0.9  # share of its joint that a vertex of an anchor needs at least, where enough have it
 
 RISING = 0.16  # by which the innermost feathers point up from the wing, so that they lie on the back when it folds
 DROP = 0.012  # of the arm, from one bone to the next, by which feathers outward lie lower than those they stand beside
@@ -82,8 +80,6 @@ ROWS = (
     Plan("lesser under coverts", "under coverts", 22, 0.1, 2.8, 0.04, (0.0, 0.2, 0.9), (0.2, 0.2, 0.14), (1.6, 1.5),
          0.026, 0.8, 4.0, -4.0, below=True),
 )
-STEP = 0.0014  # of the arm, from a feather of the tail up to the next
-TAIL_FEATHERS, TAIL_COVERTS = 12, 9
 
 
 class WingBones(NamedTuple):
@@ -105,7 +101,7 @@ def find_wings(mesh: Mesh, rig: Rig) -> list[WingBones]:
         if forearm is None or hand is None:
             continue
         bind = rig.skeleton.bind[:, :3, 3]
-        moved = mesh.points[_patch(rig, hand, len(mesh.points), 0.4)].astype(np.float64)
+        moved = mesh.points[joint_patch(rig, hand, 0.4)].astype(np.float64)
         if not len(moved):
             continue
         away = normalized(bind[hand] - bind[forearm])
@@ -113,6 +109,11 @@ def find_wings(mesh: Mesh, rig: Rig) -> list[WingBones]:
         places = np.stack([bind[joint], bind[forearm], bind[hand], tip])
         found.append(WingBones((int(rig.skeleton.parents[joint]), joint, forearm, hand), places))
     return found
+
+
+def arm_length(bones: WingBones) -> float:
+    """Metres from the shoulder along the bones to the finger tip."""
+    return float(np.linalg.norm(np.diff(bones.places, axis=0), axis=1).sum())
 
 
 def dress_wings(mesh: Mesh, rig: Rig) -> tuple[Wing, ...]:
@@ -128,7 +129,8 @@ def dress_wings(mesh: Mesh, rig: Rig) -> tuple[Wing, ...]:
         raise UserError(
             "The rig has no wing: name the joints of each wing humerus, forearm and hand, one below the other.")
     made = [_wing(mesh, rig, one, number) for number, one in enumerate(bones)]
-    tail = _tail(mesh, rig, bones, len(made))
+    size = float(np.mean([arm_length(one) for one in bones]))
+    tail = dress_tail(mesh, rig, size, len(made))
     return (*made, *(() if tail is None else (tail,)))
 
 
@@ -144,30 +146,13 @@ def _below(rig: Rig, joint: int, pattern: str) -> int | None:
     return None
 
 
-def _patch(rig: Rig, joint: int, vertices: int, least: float) -> NDArray[np.int32]:
-    share = np.where(rig.skin.joints == joint, rig.skin.weights, 0.0).sum(axis=1)
-    return np.flatnonzero(share[:vertices] >= least).astype(np.int32)
-
-
-def _anchor(mesh: Mesh, rig: Rig, joint: int, near: Array) -> Anchor:
-    """The stiffest vertices of a joint about a place, spread evenly among them."""
-    share = np.where(rig.skin.joints == joint, rig.skin.weights, 0.0).sum(axis=1)
-    rows = np.flatnonzero(share >= STIFF)
-    if len(rows) < 12:
-        rows = np.argsort(-share, kind="stable")[:12]
-    distance = np.linalg.norm(mesh.points[rows].astype(np.float64) - near, axis=1)
-    rows = rows[np.argsort(distance, kind="stable")][: 6 * PATCH]
-    rows = np.sort(rows[:: max(1, len(rows) // PATCH)][:PATCH])
-    return Anchor(joint=rig.skeleton.names[joint], vertices=freeze(rows.astype(np.int32)))
-
-
 def _wing(mesh: Mesh, rig: Rig, bones: WingBones, number: int) -> Wing:
     body, arm, forearm, hand = bones.joints
     places = bones.places
-    size = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    size = arm_length(bones)
     normal, back = _plane(bones)
     anchors = tuple(
-        _anchor(mesh, rig, joint, places[max(k - 1, 0)]) for k, joint in enumerate((body, arm, forearm, hand)))
+        anchor_of(mesh, rig, joint, places[max(k - 1, 0)]) for k, joint in enumerate((body, arm, forearm, hand)))
     end = normalized(places[3] - places[2])
     outer = normalized(end + 0.12 * back)
     body_way = normalized(places[0] - places[1])
@@ -175,7 +160,7 @@ def _wing(mesh: Mesh, rig: Rig, bones: WingBones, number: int) -> Wing:
     name = rig.skeleton.names[arm]
     return Wing(
         id=number, name=f"wing of {name}", kind="wing", anchors=anchors, rows=rows, inner=0, outer=3,
-        inner_direction=_triple(back + RISING * normal), outer_direction=_triple(outer))
+        inner_direction=as_triple(back + RISING * normal), outer_direction=as_triple(outer))
 
 
 def _plane(bones: WingBones) -> tuple[Array, Array]:
@@ -221,57 +206,3 @@ def _row(number: int, plan: Plan, places: Array, size: float, normal: Array, bac
         length=formula(FOLDED_AWAY) if plan.below else constant(1.0),
         lift=constant(float(np.radians(plan.lift))), bend=constant(float(np.radians(plan.bend))),
     )
-
-
-def _tail(mesh: Mesh, rig: Rig, bones: list[WingBones], number: int) -> Wing | None:
-    """A tail at the last of the joints that are called one, or None."""
-    called = [joint for joint, name in enumerate(rig.skeleton.names) if re.search(TAIL, name.lower())]
-    if not called:
-        return None
-    joint = called[-1]
-    own = mesh.points[_patch(rig, joint, len(mesh.points), 0.6)].astype(np.float64)
-    if len(own) < 4:
-        return None
-    start = rig.skeleton.bind[joint, :3, 3]
-    size = float(np.mean([np.linalg.norm(np.diff(one.places, axis=0), axis=1).sum() for one in bones]))
-    tip = own[np.argmax(np.linalg.norm(own - start, axis=1))]
-    back = normalized(tip - start)
-    across = np.array([1.0, 0.0, 0.0]) - back * back[0]
-    across = normalized(across)
-    normal = normalized(np.cross(across, back))
-    if normal[1] < 0.0:
-        normal = -normal
-    anchor = _anchor(mesh, rig, joint, tip)
-    half = np.radians(13.0)
-    ends = [normalized(np.cos(half) * back + s * np.sin(half) * across) for s in (-1.0, 1.0)]
-    root = tip - 0.05 * size * back + 0.01 * size * normal
-    line = np.stack([root + s * 0.055 * size * across for s in (-1.0, 0.0, 1.0)])
-    line -= np.array([0.02, 0.0, 0.02])[:, None] * size * normal
-
-    def row(
-        k: int, name: str, part: str, count: int, line: Array, lengths: tuple[float, ...], widths: tuple[float, ...],
-        height: float, bend: float, lift: float,
-    ) -> WingRow:
-        return WingRow(
-            id=k, name=name, part=part, count=count, anchors=freeze(np.zeros(3, np.int32)),
-            places=freeze(line.astype(np.float32)), normals=freeze(np.tile(normal, (3, 1)).astype(np.float32)),
-            shares=freeze(np.array([0.0, 0.5, 1.0], np.float32)),
-            lengths=freeze(np.array(lengths, np.float32) * np.float32(size)),
-            widths=freeze(np.array(widths, np.float32)),
-            height=height * size, step=STEP * size, top=0.5, bend=constant(float(np.radians(bend))),
-            lift=constant(float(np.radians(lift))),
-        )
-
-    return Wing(
-        id=number, name=f"tail of {rig.skeleton.names[joint]}", kind="tail", anchors=(anchor,),
-        rows=(
-            row(0, "tail feathers", "tail", TAIL_FEATHERS, line, (1.0, 0.9, 1.0), (0.9, 1.0, 0.9), 0.0, 0.0, 0.0),
-            row(1, "tail coverts", "tail coverts", TAIL_COVERTS, line + 0.05 * size * (0.5 * normal - back),
-                (0.36, 0.46, 0.36), (1.1, 1.2, 1.1), 0.022, -6.0, 0.0),
-        ),
-        inner=0, outer=0, inner_direction=_triple(ends[0]), outer_direction=_triple(ends[1]), middle=0.5,
-    )
-
-
-def _triple(vector: Array) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])

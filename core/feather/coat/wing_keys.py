@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from core.evaluator import Evaluator
 from core.feather.coat.frames import unit
@@ -18,7 +19,8 @@ from core.mesh.roots import Roots
 from core.mesh.skin import Skin
 from core.mesh.surface import place_roots
 
-INNERMOST = 2  # feathers of a row that keys stand beside
+CLEAR = 0.8  # of their length, around keys beside a wing, in which no others stand
+INNERMOST = 4  # feathers of a row that keys stand beside
 COVERTS = "covert"  # rows whose parts are called so lie on the skin
 
 
@@ -44,3 +46,11 @@ def keys_beside(wings: tuple[Wing, ...], mesh: Mesh, skin: Skin, evaluator: Eval
     along = laid.frames[first][found][:, 1].astype(np.float64)
     along = unit(along - normals * np.einsum("nc,nc->n", along, normals)[:, None])
     return Beside(roots, along, laid.poses[first][found][:, LENGTH])
+
+
+def clear_of(
+    places: NDArray[np.float32], beside: NDArray[np.float32], lengths: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which of the places (N, 3) of other keys are not so near that they would speak against those at `beside`."""
+    away = cKDTree(beside).query(places)[0] if len(beside) else np.full(len(places), np.inf)
+    return np.asarray(away > CLEAR * float(np.median(lengths)) if len(lengths) else away > 0.0)

@@ -21,7 +21,7 @@ def for_all(item: AttributeValue) -> bool:
 LIKE = {
     "tertials": "secondaries", "alula": "primary coverts", "primary coverts": "greater coverts",
     "greater coverts": "median coverts", "median coverts": "lesser coverts", "lesser coverts": "back",
-    "scapulars": "back", "tail coverts": "back",
+    "scapulars": "back", "tail coverts": "back", "under tail coverts": "body",
 }
 
 

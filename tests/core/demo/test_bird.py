@@ -19,7 +19,8 @@ def test_one_closed_oriented_body_of_quads(bird):
     assert np.all(mesh.counts == 4)
     corners = mesh.corners.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     body = trimesh.Trimesh(mesh.points, corners, process=False)
-    assert body.is_watertight and body.is_winding_consistent
+    assert body.is_watertight
+    assert body.is_winding_consistent
     assert body.volume > 0.0
     assert body.euler_number == 2  # a sphere with limbs, no handle
     assert len(body.split(only_watertight=False)) == 1
@@ -36,7 +37,8 @@ def test_it_is_as_large_as_a_finch_and_symmetric(bird):
 
 
 def test_uvs_lie_in_the_square(bird):
-    assert bird.mesh.uvs.min() >= 0.0 and bird.mesh.uvs.max() <= 1.0
+    assert bird.mesh.uvs.min() >= 0.0
+    assert bird.mesh.uvs.max() <= 1.0
 
 
 def test_its_clip_folds_both_wings_alike_and_turns_the_head(bird):
@@ -56,7 +58,8 @@ def test_its_clip_folds_both_wings_alike_and_turns_the_head(bird):
         # the head does not turn yet, so that left and right are alike
         np.testing.assert_allclose(posed[pairs] * [-1, 1, 1], posed, atol=1e-5)
     assert spans[1001.0] < 0.025 < 0.05 < spans[1024.0]
-    assert looks[1006.0] > 0.008 and looks[1041.0] < -0.008
+    assert looks[1006.0] > 0.008
+    assert looks[1041.0] < -0.008
     end = posed_points(mesh.points, rig, rig.clip.end)
     np.testing.assert_allclose(end[hand, 0].mean(), spans[1001.0], atol=1e-4)
 
