@@ -14,7 +14,7 @@ from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
 from core.feather.attributes import column
 from core.feather.coat.coat import FeatherCoat
-from core.feather.coat.export import instances, left_crossing, shown_rows
+from core.feather.coat.export import crossing_wings, instances, left_crossing, shown_rows, wing_rows
 from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Laid, Plumage
 from core.feather.coat.worn import worn_preset, worn_values
@@ -89,15 +89,25 @@ def export_frame(
     figures: Figures
     if each:
         left = left_crossing(laid, evaluator.workers)
-        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], laid.layered.vanes[rows], attributes)
+        vanes = laid.layered.vanes[rows]
+        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], vanes, attributes)
         figures = {}
     else:
         found = instances(laid, evaluator.workers, added)
         left = found.left
+        vanes = found.vanes
         made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
         figures = {
             "shapes": len(found.prototypes), "quantising_error": found.error,
             "crossings_16_bit": len(found.coarse.first),
+        }
+    wings = wing_rows(laid)
+    if len(wings):
+        made = made._replace(wing_ids=laid.ids[wings], wing_vanes=laid.layered.vanes[wings])
+        with_skin, among = crossing_wings(laid, vanes, evaluator.workers)
+        figures = {
+            **figures, "wing_feathers": len(wings), "crossings_of_wings_with_skin_feathers": with_skin,
+            "crossings_within_wings": among,
         }
     ids = laid.ids[rows]
     worst = [[int(ids[a]), int(ids[b])] for a, b in zip(left.first, left.second, strict=True)]

@@ -27,10 +27,13 @@ def add_feathers(
     document: Document, mesh_id: int, count: int, evaluator: Evaluator, preset: str = "goldfinch",
     placement: str = "rows", keys: int = KEYS, seed: int = 0,
 ) -> Document:
-    """The document with a coat of exactly `count` feathers on a mesh, and a groom of its keys to comb; for a job."""
+    """The document with a coat of exactly `count` feathers on a mesh, and a groom of its keys to comb; for a job.
+
+    A rig with wings gets their feathers too (``wing_edits``).
+    """
     item = find_mesh(document, mesh_id)
-    return with_dressed(
-        document, dress_feathers(item.mesh, evaluator, count, preset, placement, keys, seed, mesh_id=mesh_id))
+    return with_dressed(document, dress_feathers(
+        item.mesh, evaluator, count, preset, placement, keys, seed, mesh_id=mesh_id, rig=item.rig))
 
 
 def with_dressed(document: Document, dressed: Dressed) -> Document:

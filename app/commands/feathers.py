@@ -23,7 +23,7 @@ from core.formats import rig_file
 from core.formats.atomic import atomic_write
 from core.formats.curve_file import maker
 from core.formats.mesh_file import read_mesh
-from core.formats.project import write_project
+from core.formats.project import read_project, write_project
 from core.formats.rig_assembly import NoRig
 from core.formats.usd_feathers import SUFFIXES, FeatherWriter
 from core.mesh.skin import Skin
@@ -32,13 +32,14 @@ CHOICES = tuple(kind for kind in PLACEMENTS if kind not in ("hand", "field"))  #
 
 
 def command(
-    mesh: Annotated[Path, typer.Argument(help="The bird: OBJ, PLY, STL, OFF, GLB/glTF, USD, Alembic.", show_default=False)],
+    mesh: Annotated[Path, typer.Argument(help="The bird: OBJ, PLY, STL, OFF, GLB/glTF, USD, Alembic, or a project (.filo).", show_default=False)],
     output: Annotated[list[Path], typer.Option("--output", "-o", help="Where the coat goes: .filo .usdc .usda .usd, or .png for a picture. May be given again.", show_default=False)],
     count: Annotated[int, typer.Option(min=0, max=2_000_000, help="Feathers, exactly.")] = 10_000,
     preset: Annotated[str, typer.Option(help="The bird the feathers are of.")] = "goldfinch",
     placement: Annotated[str, typer.Option(help=f"How feathers are set: {', '.join(CHOICES)}.")] = "rows",
     keys: Annotated[int, typer.Option(min=1, max=100_000, help="Keys laid along the body, exactly.")] = KEYS,
-    overlap: Annotated[float, typer.Option(min=0.1, max=50.0, help="How many rows a feather covers.")] = 3.7,
+    overlap: Annotated[float | None, typer.Option(min=0.1, max=50.0, help="How many rows a feather covers; by default 3.7, and 5.5 on a bird with wings.", show_default=False)] = None,
+    wings: Annotated[bool, typer.Option("--wings/--no-wings", help="Give a rig whose joints are called humerus, forearm and hand the feathers of wings and tail, beyond the count.")] = True,
     frames: Annotated[str | None, typer.Option(help="Frames to write, as A-B; the mesh must move.")] = None,
     each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
     curves: Annotated[bool, typer.Option("--curves", help="Write the shafts alone, as curves with widths for hair renderers.")] = False,
@@ -62,7 +63,8 @@ def command(
         item = document.meshes[0]
         with report.stage("keys", "laying keys along the body"):
             dressed = dress_feathers(
-                item.mesh, evaluator, count, preset, placement, keys, seed, overlap, mesh_id=item.id)
+                item.mesh, evaluator, count, preset, placement, keys, seed, overlap, mesh_id=item.id,
+                rig=item.rig if wings else None)
         plumage = Plumage(evaluator)
         with report.stage("place", "setting feathers"):
             plumage.bed(dressed.coat, dressed.keys, item.mesh)
@@ -92,8 +94,13 @@ def _check(outputs: list[Path]) -> None:
 
 
 def _document(path: Path, unit: str | None, up: str | None, moving: bool, report: Report) -> Document:
-    """The mesh of a file, with what moves it when frames are asked for."""
-    if moving and path.suffix.lower() in rig_file.READ_SUFFIXES:
+    """The mesh of a file, with what moves it; the first mesh of a project, without its hair and feathers."""
+    if path.suffix.lower() == ".filo":
+        opened = read_project(path).document
+        if not opened.meshes:
+            raise UserError(f"{path.name} has no mesh to grow feathers on")
+        return opened.replace(meshes=opened.meshes[:1], grooms=(), feathers=())
+    if path.suffix.lower() in rig_file.READ_SUFFIXES:
         with suppress(NoRig):
             return rig_file.document_of(rig_file.read_rig(path, unit=unit, up=up, say=report.note))
     source = read_mesh(path, unit=unit, up=up, say=report.note)

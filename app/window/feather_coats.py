@@ -11,7 +11,7 @@ from app.window.commands import Command, Window
 from app.window.desk import Desk
 from app.window.jobs import Asked, Progress
 from app.window.window_commands import shown_panels
-from core.document import MeshObject, feathers_of
+from core.document import MeshObject, feathers_of, find_mesh
 from core.errors import UserError
 from core.feather.presets import bird_names, load_bird
 from tools.scene import active_mesh
@@ -30,7 +30,7 @@ def dress_with_feathers(desk: Desk, item: MeshObject, bird: str, owner: QObject 
         import tools.feather_edits  # noqa: F401 - with its kernels, so that the window need not wait for them
         from core.feather.coat.dress import dress_feathers
 
-        return dress_feathers(item.mesh, evaluator, FEATHERS, bird, mesh_id=item.id)
+        return dress_feathers(item.mesh, evaluator, FEATHERS, bird, mesh_id=item.id, rig=item.rig)
 
     def put(dressed: Dressed) -> None:
         from tools.feather_edits import with_dressed
@@ -64,6 +64,22 @@ def _remove(window: Window) -> None:
     coat = feathers_of(window.desk.document, window.desk.groom)
     if coat is not None:
         window.desk.edit("Remove feathers", remove_feathers, coat.id)
+
+
+def _add_wings(window: Window) -> None:
+    from tools.wing_edits import add_wings
+
+    coat = feathers_of(window.desk.document, window.desk.groom)
+    if coat is not None:
+        window.desk.edit("Feathers of the wings", add_wings, coat.id)
+
+
+def _remove_wings(window: Window) -> None:
+    from tools.wing_edits import remove_wings
+
+    coat = feathers_of(window.desk.document, window.desk.groom)
+    if coat is not None:
+        window.desk.edit("Remove the wings", remove_wings, coat.id)
 
 
 def _draw_tract(window: Window) -> None:
@@ -125,6 +141,20 @@ def _needs_tract(desk: Desk) -> str | None:
     return None if coat is not None and coat.tracts else "There is no tract: draw one along selected keys first."
 
 
+def _needs_rig(desk: Desk) -> str | None:
+    coat = feathers_of(desk.document, desk.groom)
+    if coat is None:
+        return _needs_feathers(desk)
+    if find_mesh(desk.document, coat.mesh_id).rig is not None:
+        return None
+    return "The mesh has no rig: wings stand on joints called humerus, forearm and hand."
+
+
+def _needs_wings(desk: Desk) -> str | None:
+    coat = feathers_of(desk.document, desk.groom)
+    return None if coat is not None and coat.wings else "These feathers have no wings."
+
+
 def _are_hidden(desk: Desk) -> bool:
     coat = feathers_of(desk.document, desk.groom)
     return coat is not None and coat.hidden
@@ -151,6 +181,16 @@ FEATHER_COATS: tuple[Command, ...] = (
         "Opens the editor of one feather beside the coat: outline, dials and every attribute.",
         _edit_feather, "tools.feather_edits.set_attributes", enabled=_needs_feathers,
         icon="feather", words="editor attributes shape outline barbs dials"),
+    Command(
+        "feathers.wings", "Feathers of the wings",
+        "Gives a rig quills, coverts and tail feathers on its joints called humerus, forearm, hand and tail.",
+        _add_wings, "tools.wing_edits.add_wings", "document", "Feathers of the wings", _needs_rig,
+        words="primaries secondaries tertials coverts remiges rectrices tail bird fold flight"),
+    Command(
+        "feathers.remove_wings", "Remove the feathers of the wings",
+        "Takes the feathers of wings and tail away and leaves those of the skin as they are.",
+        _remove_wings, "tools.wing_edits.remove_wings", "document", "Remove the wings", _needs_wings,
+        words="delete primaries coverts tail flight"),
     Command(
         "feathers.tract", "Tract along selected keys",
         "Makes a band of skin from selected key to key, which placements may keep to.",

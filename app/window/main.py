@@ -274,6 +274,10 @@ class MainWindow(QMainWindow):
         else:
             self.opening.open(path)
 
+    def open_bare_bird(self) -> None:
+        """Open the project's own bird without feathers."""
+        self.opening.open_bare_bird()
+
     def make_playblast(self) -> None:
         """Ask for a playblast beside the work."""
         (width, height), view = self.viewport.pixels(), self.desk.workspace.view

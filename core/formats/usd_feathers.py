@@ -6,6 +6,7 @@ What is written, under the default prim ``/Feathers`` (metres, Y up, extents aut
     /Feathers/<name>/Prototypes    one Mesh for every quantised shape, feathers of length 1
     /Feathers/<name>               or Mesh: all feathers, with the primvar feather_id per face
     /Feathers/<name>               or BasisCurves: their shafts, with widths and the primvar feather_id per curve
+    /Feathers/<name>_wings         Mesh or BasisCurves: the feathers of wings and tail, each as it is, with feather_id
     /Feathers/mesh                 the animal, moving where it moves
     /Feathers/Looks/feather        UsdPreviewSurface and MaterialX, bound to both
 
@@ -34,6 +35,7 @@ class FeatherFrame(NamedTuple):
     """One frame of a coat: instances, or vanes (N, R, C, 3) float32 with ids (N,) when every feather is a mesh.
 
     points : (V, 3) float32, the animal. attributes : primvars of the feathers, (N,) float32 by name.
+    wing_ids, wing_vanes : (M,) int32, (M, R, C, 3) float32, feathers of wings, or None.
     """
 
     frame: float
@@ -42,6 +44,8 @@ class FeatherFrame(NamedTuple):
     ids: NDArray[np.int32]
     vanes: NDArray[np.float32] | None
     attributes: dict[str, NDArray[np.float32]]
+    wing_ids: NDArray[np.int32] | None = None
+    wing_vanes: NDArray[np.float32] | None = None
 
 
 class FeatherWriter:
@@ -77,6 +81,7 @@ class FeatherWriter:
         self._material = usd_material(stage, "/Feathers/Looks/feather", look)
         self._mesh = _animal(stage, mesh)
         self._coat: Any = None
+        self._wings: Any = None
         if animated:
             stage.SetTimeCodesPerSecond(fps)
             stage.SetFramesPerSecond(fps)
@@ -90,10 +95,11 @@ class FeatherWriter:
         self._mesh.CreateExtentAttr().Set(_extent(frame.points), time)
         if frame.instances is not None:
             self._write_instances(frame, frame.instances, time)
-        elif self._shafts is not None:
-            self._write_shafts(frame, self._shafts, time)
-        else:
-            self._write_meshes(frame, time)
+        elif frame.vanes is not None:
+            self._coat = self._write_each(self._coat, self._place, frame.ids, frame.vanes, frame.attributes, time)
+        if frame.wing_ids is not None and frame.wing_vanes is not None:
+            self._wings = self._write_each(
+                self._wings, f"{self._place}_wings", frame.wing_ids, frame.wing_vanes, {}, time)
 
     def close(self, first: float | None = None, last: float | None = None) -> None:
         """Save what was written."""
@@ -101,7 +107,7 @@ class FeatherWriter:
             self._stage.SetStartTimeCode(first)
             self._stage.SetEndTimeCode(last)
         self._layer.Save()
-        self._stage = self._mesh = self._coat = self._layer = None
+        self._stage = self._mesh = self._coat = self._wings = self._layer = None
 
     def _write_instances(self, frame: FeatherFrame, found: Instances, time: Any) -> None:
         from pxr import UsdGeom, UsdShade, Vt
@@ -129,55 +135,67 @@ class FeatherWriter:
         coat.CreateScalesAttr().Set(Vt.Vec3fArray.FromNumpy(scales), time)
         coat.CreateIdsAttr().Set(Vt.Int64Array.FromNumpy(found.ids.astype(np.int64)), time)
         coat.CreateExtentAttr().Set(_extent(found.vanes.reshape(-1, 3)), time)
-        self._write_attributes(coat, frame, UsdGeom.Tokens.vertex, 1, time)
+        self._write_attributes(coat, frame.attributes, UsdGeom.Tokens.vertex, 1, time)
         coat.GetPrim().SetCustomDataByKey("filoplume:quantising_error", found.error)
 
-    def _write_meshes(self, frame: FeatherFrame, time: Any) -> None:
+    def _write_each(
+        self, prim: Any, place: str, ids: NDArray[np.int32], vanes: NDArray[np.float32],
+        attributes: dict[str, NDArray[np.float32]], time: Any,
+    ) -> Any:
+        """Feathers as their own shapes, or as the curves of their shafts; the prim they are in."""
+        if self._shafts is not None:
+            return self._write_shafts(prim, place, ids, vanes, self._shafts, attributes, time)
         from pxr import UsdGeom, UsdShade
 
-        assert frame.vanes is not None  # one of the two is given
-        vanes = frame.vanes
-        if self._coat is None:
-            self._coat = UsdGeom.Mesh.Define(self._stage, self._place)
-            UsdShade.MaterialBindingAPI.Apply(self._coat.GetPrim()).Bind(self._material)
-        _write_vanes(self._coat, vanes, time)
-        self._write_of_each(frame, 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1), time)
+        if prim is None:
+            prim = UsdGeom.Mesh.Define(self._stage, place)
+            UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(self._material)
+        _write_vanes(prim, vanes, time)
+        self._write_of_each(prim, ids, attributes, 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1), time)
+        return prim
 
-    def _write_shafts(self, frame: FeatherFrame, radii: tuple[float, float], time: Any) -> None:
+    def _write_shafts(
+        self, prim: Any, place: str, ids: NDArray[np.int32], vanes: NDArray[np.float32], radii: tuple[float, float],
+        attributes: dict[str, NDArray[np.float32]], time: Any,
+    ) -> Any:
         from pxr import UsdGeom, UsdShade, Vt
 
-        assert frame.vanes is not None  # one of the two is given
-        shafts = np.ascontiguousarray(frame.vanes[:, :, frame.vanes.shape[2] // 2])  # the middle column of a vane
-        if self._coat is None:
-            self._coat = UsdGeom.BasisCurves.Define(self._stage, self._place)
-            self._coat.CreateTypeAttr(UsdGeom.Tokens.linear)
-            self._coat.CreateWidthsAttr()
-            self._coat.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
-            UsdShade.MaterialBindingAPI.Apply(self._coat.GetPrim()).Bind(self._material)
+        shafts = np.ascontiguousarray(vanes[:, :, vanes.shape[2] // 2])  # the middle column of a vane
+        if prim is None:
+            prim = UsdGeom.BasisCurves.Define(self._stage, place)
+            prim.CreateTypeAttr(UsdGeom.Tokens.linear)
+            prim.CreateWidthsAttr()
+            prim.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+            UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(self._material)
         count, rows = shafts.shape[:2]
         lengths = np.linalg.norm(np.diff(shafts, axis=1), axis=2).sum(axis=1)
         widths = 2.0 * lengths[:, None] * np.linspace(*radii, rows)
         points = shafts.reshape(-1, 3)
-        self._coat.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, rows, np.int32)), time)
-        self._coat.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), time)
-        self._coat.GetWidthsAttr().Set(Vt.FloatArray.FromNumpy(widths.reshape(-1).astype(np.float32)), time)
-        self._coat.CreateExtentAttr().Set(_extent(points, float(widths.max(initial=0.0)) / 2.0), time)
-        self._write_of_each(frame, 1, time)
+        prim.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, rows, np.int32)), time)
+        prim.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), time)
+        prim.GetWidthsAttr().Set(Vt.FloatArray.FromNumpy(widths.reshape(-1).astype(np.float32)), time)
+        prim.CreateExtentAttr().Set(_extent(points, float(widths.max(initial=0.0)) / 2.0), time)
+        self._write_of_each(prim, ids, attributes, 1, time)
+        return prim
 
-    def _write_of_each(self, frame: FeatherFrame, times: int, time: Any) -> None:
+    def _write_of_each(
+        self, prim: Any, ids: NDArray[np.int32], attributes: dict[str, NDArray[np.float32]], times: int, time: Any
+    ) -> None:
         """Ids and attributes of feathers that are `times` faces or curves each."""
         from pxr import Sdf, UsdGeom, Vt
 
-        api = UsdGeom.PrimvarsAPI(self._coat)
+        api = UsdGeom.PrimvarsAPI(prim)
         made = api.CreatePrimvar("feather_id", Sdf.ValueTypeNames.IntArray, UsdGeom.Tokens.uniform)
-        made.Set(Vt.IntArray.FromNumpy(np.repeat(frame.ids, times)), time)
-        self._write_attributes(self._coat, frame, UsdGeom.Tokens.uniform, times, time)
+        made.Set(Vt.IntArray.FromNumpy(np.repeat(ids, times)), time)
+        self._write_attributes(prim, attributes, UsdGeom.Tokens.uniform, times, time)
 
-    def _write_attributes(self, prim: Any, frame: FeatherFrame, each: Any, times: int, time: Any) -> None:
+    def _write_attributes(
+        self, prim: Any, attributes: dict[str, NDArray[np.float32]], each: Any, times: int, time: Any
+    ) -> None:
         from pxr import Sdf, UsdGeom, Vt
 
         api = UsdGeom.PrimvarsAPI(prim)
-        for name, column in frame.attributes.items():
+        for name, column in attributes.items():
             made = api.CreatePrimvar(_identifier(name), Sdf.ValueTypeNames.FloatArray, each)
             made.Set(Vt.FloatArray.FromNumpy(np.repeat(column.astype(np.float32), times)), time)
 

@@ -19,6 +19,7 @@ from app.window.feather.attribute_list import AttributeList
 from app.window.feather.canvas import FlatCanvas, FlatFeather
 from app.window.feather.placements import PlacementList
 from app.window.feather.solid import Draw, SolidView
+from app.window.feather.wings import WingList
 from app.window.fields.choice_bar import ChoiceBar
 from app.window.fields.number_bar import NumberBar
 from app.window.files.opening import PICTURE_SUFFIXES, choose_file, filter_of
@@ -93,6 +94,7 @@ class FeatherSide(QWidget):
         }
         self.attributes = AttributeList()
         self.placements = PlacementList(desk)
+        self.wings = WingList(desk)
         self._asked: tuple[object, ...] = ()
         self._busy = self._laid = False
         self._lay_out(memory)
@@ -130,6 +132,7 @@ class FeatherSide(QWidget):
             other.layout().addWidget(widget)  # type: ignore[union-attr]
         below.add(Section("Another feather", other, memory, "feather other"))
         below.add(Section("Placement", self.placements, memory, "feather placement"))
+        below.add(Section("Wings", self.wings, memory, "feather wings"))
         below.add(Section("Attributes", self.attributes, memory, "feather attributes"))
         parts = self._parts = QSplitter(Qt.Orientation.Vertical)
         parts.setChildrenCollapsible(False)
@@ -173,6 +176,7 @@ class FeatherSide(QWidget):
             self.solid.show_mesh(None)
             self.told.setText("")
             self.placements.show_coat(None, ())
+            self.wings.show_coat(None)
             self._asked = ()
             return
         parts = ["body", *(name for name in load_bird(coat.preset).feathers if name != "body")]
@@ -189,6 +193,7 @@ class FeatherSide(QWidget):
         groom = self.desk.groom
         maps = () if groom is None else tuple(item.name for item in groom.maps)
         self.placements.show_coat(coat, maps)
+        self.wings.show_coat(coat)
         setting = Setting(self.desk.document.unit, self.desk.workspace.frame, NAMES, maps)
         preset = worn_preset(coat, self.part.value())
         plain = worn_values(coat.replace(dials=()), preset)  # bars show what is set, not what the dials make of it

@@ -51,6 +51,10 @@ FILE: tuple[Command, ...] = (
         "file.open_recent", "Open recent…", "Lists the files you had open last; choose one to open it again.",
         lambda w: w.show_recent(), "tools.session.Session.open", "file", icon="recent", words="last history files"),
     Command(
+        "file.demo_bird", "Open the demo bird", "Opens the bird of the demo without a feather, to be dressed by hand.",
+        lambda w: w.open_bare_bird(), "core.demo.bird_document.bare_bird_document", "file",
+        words="goldfinch finch feathers wing example"),
+    Command(
         "file.save", "Save", "Saves the project to its file; the version before is kept beside it.",
         lambda w: w.save(), "tools.session.Session.save", "file", enabled=_can_save, icon="save", words="write store"),
     Command(

@@ -141,6 +141,19 @@ class Opening(QObject):
 
         self._desk.jobs.start("Open the demo", work, done)
 
+    def open_bare_bird(self) -> None:
+        """Open the project's own finch without a feather, to be dressed."""
+
+        def work(progress: Progress, cancelled: Asked) -> Document:
+            from core.demo.bird_document import bare_bird_document
+
+            return bare_bird_document()
+
+        def done(document: Document) -> None:
+            self._show(self._make(document, name="Demo bird"), document.first_frame)
+
+        self._desk.jobs.start("Open the demo bird", work, done)
+
     def _open_project(self, path: Path) -> None:
         hashes = ArrayHashes()
 

@@ -11,7 +11,7 @@ from core.pose.rig import Rig
 from core.record import freeze
 
 BARE = ("eye", "beak", "bill", "feet", "foot", "claw", "toe", "tongue")  # words in the names of parts
-AROUND_EYES = 1.6  # radii of an eye that stay free around it
+AROUND_EYES = 1.8  # radii of an eye that stay free around it
 ARM = 0.4  # share of forearm and hand in a vertex from which the wing's own rows cover it
 STUB = 0.85  # share of the tail in a vertex from which its coverts cover it
 NAME = "feathered"  # of the map

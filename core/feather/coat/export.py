@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.layering import Crossings, Feathers, Layered, crossings, layer
 from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST, pose_vanes
+from core.feather.coat.wing import WING_IDS
 from core.feather.coat.winged import Laid
 from core.workers import Workers
 
@@ -46,8 +47,23 @@ class Instances(NamedTuple):
 
 
 def shown_rows(laid: Laid) -> NDArray[np.int32]:
-    """Rows of the feathers that are written."""
-    return np.flatnonzero(laid.shown).astype(np.int32)
+    """Rows of the feathers of the skin that are written."""
+    return np.flatnonzero(laid.shown & (laid.ids < WING_IDS)).astype(np.int32)
+
+
+def wing_rows(laid: Laid) -> NDArray[np.int32]:
+    """Rows of the feathers of wings, which are written as they are and never settled again."""
+    return np.flatnonzero(laid.ids >= WING_IDS).astype(np.int32)
+
+
+def crossing_wings(laid: Laid, vanes: NDArray[np.float32], workers: Workers) -> tuple[int, int]:
+    """How many pairs cross of a feather of a wing and one of the skin (`vanes`, as written), and of two of wings."""
+    rows = wing_rows(laid)
+    both = np.concatenate([vanes, laid.layered.vanes[rows]])
+    boxes, none = vane_boxes(both, workers.ranges), np.zeros(0, np.int32)
+    found = crossings(Layered(np.zeros((len(both), POSE)), both, boxes, none, none), laid.skin.bvh, workers)
+    first, second = found.first >= len(vanes), found.second >= len(vanes)
+    return int((first != second).sum()), int((first & second).sum())
 
 
 def left_crossing(laid: Laid, workers: Workers) -> Crossings:

@@ -22,8 +22,8 @@ STIFF = 0.9  # share of its joint that a vertex of an anchor needs at least, whe
 FEATHERS, HALF_FAN = 12, np.radians(13.0)
 STEP = 0.0014  # of the arm of the wing, from a feather up to the next
 # how far before the end of the stub, length, feathers, height: of the arm but for the number
-COVERTS = ((0.05, 0.40, 9, 0.014), (0.14, 0.34, 10, 0.018), (0.23, 0.29, 11, 0.022), (0.32, 0.25, 11, 0.026))
-AROUND = np.radians(82.0)  # to either side of the top
+COVERTS = ((0.08, 0.36, 9, 0.004), (0.16, 0.32, 10, 0.008), (0.24, 0.28, 11, 0.012), (0.32, 0.25, 11, 0.016))
+AROUND = np.radians(70.0)  # to either side of the top
 SLAB = 0.05  # of the arm, half of the stretch over which the stub is measured
 
 
@@ -92,7 +92,7 @@ def _around(
     """Places and normals (5, 3) over one side of the stub, measured on its points."""
     wide, high = _girth(points, tip, back, across, normal, before, size)
     _, behind = _girth(points, tip, back, across, normal, before - 2.0 * SLAB * size, size)
-    slope = np.clip((high - behind) / (2.0 * SLAB * size), 0.0, 0.6)  # it tapers, and the feathers with it
+    slope = np.clip((high - behind) / (2.0 * SLAB * size), 0.0, 0.12)  # it tapers, and the feathers with it
     angles = np.linspace(-AROUND, AROUND, 5)
     sides, tops = np.sin(angles)[:, None] * across, np.cos(angles)[:, None] * normal
     places = tip - before * back + wide * sides + high * tops
