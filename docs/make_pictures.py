@@ -33,6 +33,7 @@ from tests.display import ensure_display
 
 PICTURES = Path(__file__).parent / "pictures"
 CAT = Path("meshes/odedstein_A/cat/cat-low-resolution.obj")  # Oded Stein's meshes, CC BY 4.0
+PENGUIN = CAT.parents[1] / "penguin/penguin.obj"
 TUM = Path("matchmove/rgbd_tum_slambook_A/ch5/rgbd/color")  # slambook (Xiang Gao, MIT), after TUM
 # the chapter made of its steps stands between
 FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"
@@ -177,6 +178,35 @@ def feathers() -> None:
     cv2.imwrite(str(PICTURES / "feathers.jpg"), sheet[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
+def feather_window(bird: Path, evaluator: Evaluator) -> None:
+    """The craft of feathers in the window: a tract, and a feather that was pulled off the breast."""
+    ensure_display()
+    from app.window.screenshot import window_image
+    from tests.window.alone import hand_at
+    from tests.window.take_pictures import reduced
+    from tools.feather_edits import add_feathers
+
+    mesh = read_mesh(bird, unit="m", up="y").mesh
+    document = add_feathers(Document(meshes=(MeshObject(id=1, name="penguin", mesh=mesh),)), 1, 2500, evaluator)
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
+        hand = hand_at(document, (1600, 1000))
+        run = hand.window.commands.run
+        run("window.craft_feather")
+        hand.finish()
+        run("tool.tract")
+        hand.drag((0.42, 0.38), (0.43, 0.66))
+        hand.finish()
+        run("tool.shaft")
+        hand.drag((0.55, 0.48), (0.62, 0.40))
+        hand.finish()
+        hand.move((0.53, 0.58))
+        hand.painted()
+        image = reduced(window_image(hand.window), 0.75)
+        cv2.imwrite(str(PICTURES / "feather-shaft.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        hand.window.close_unasked()
+
+
 def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     feathers()
@@ -204,6 +234,7 @@ def main() -> None:
     match_window(Path(data) / SINTEL, "match-window.jpg")
     match_window(Path(data) / TUM, "match-tum.jpg")
     first_track()
+    feather_window(Path(data) / PENGUIN, evaluator)
     mesh = read_mesh(Path(data) / CAT, unit="m", up="y").mesh
     made = []
     for name in STYLES:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from core.document import Document, MeshObject
 from core.evaluator import Evaluator
+from core.feather.coat.plumages import Plumages
 from core.groom.groom import Groom
 from core.history import History
 from core.workspace import Workspace
@@ -21,7 +22,8 @@ class Work(Protocol):
     """What a craft sees of a session.
 
     history : its current document is the one to edit. workspace : the frame, what is respected, what is active.
-    evaluator : remembers what is made of the document. groom, mesh : worked on; UserError when there is none.
+    evaluator : remembers what is made of the document. plumages : how its coats of feathers lie.
+    groom, mesh : worked on; UserError when there is none.
     waits : a stroke begins only when what it collides with is there.
     """
 
@@ -31,6 +33,8 @@ class Work(Protocol):
     def workspace(self) -> Workspace: ...
     @property
     def evaluator(self) -> Evaluator: ...
+    @property
+    def plumages(self) -> Plumages: ...
     @property
     def groom(self) -> Groom: ...
     @property

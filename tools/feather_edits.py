@@ -12,14 +12,21 @@ from core.document import Document, find_feathers, find_mesh, free_id, keys_of, 
 from core.errors import UserError
 from core.evaluator import Evaluator
 from core.feather.attributes import ATTRIBUTES, COLUMNS
-from core.feather.coat.coat import AttributeValue, DialTurn, FeatherCoat, Placement, Stroke, Tract
+from core.feather.coat.coat import AttributeValue, DialTurn, FeatherCoat, Placement
+from core.feather.coat.drawn import (
+    coat_with_set,
+    coat_with_stroke,
+    coat_with_tract,
+    coat_without_set,
+    coat_without_strokes,
+)
 from core.feather.coat.dress import KEYS, Dressed, dress_feathers
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.proxy import demoted, keyed, promoted
 from core.feather.coat.worn import for_all, worn_preset
 from core.feather.presets import preset_values
 from core.groom.groom import Groom
-from core.record import freeze
+from core.mesh.roots import Roots
 from core.value import Constant, Value, constant
 
 
@@ -151,7 +158,8 @@ def remove_placement(document: Document, coat_id: int, number: int) -> Document:
 
     An empty one keeps its place before others, for ids of feathers come from it; at the end it goes.
     """
-    emptied = set_placement(document, coat_id, number, kind="rows", count=0, hand=None, density_map=None, tract=None)
+    emptied = set_placement(
+        document, coat_id, number, kind="rows", count=0, hand=None, hand_ids=None, density_map=None, tract=None)
     placements = find_feathers(emptied, coat_id).placements
     while placements and not placements[-1].count and placements[-1].hand is None:
         placements = placements[:-1]
@@ -194,15 +202,35 @@ def strokes_of_keys(document: Document, coat_id: int, keys: Collection[int]) -> 
 def add_tract(document: Document, coat_id: int, name: str, line: ArrayLike, width: float) -> Document:
     """The document with a tract drawn on a coat: `line` (P, 3) on the skin at rest, `width` in metres."""
     coat = _free(document, coat_id)
-    tract = Tract(name=name, line=freeze(np.array(line, np.float32)), width=width)
-    return set_feathers(document, coat_id, tracts=(*coat.tracts, tract))
+    try:
+        return with_feathers(document, coat_with_tract(coat, name, line, width))
+    except (ValueError, TypeError) as error:
+        raise UserError(f"This tract cannot be drawn: {error}.") from error
 
 
 def add_stroke(document: Document, coat_id: int, points: ArrayLike) -> Document:
     """The document with a stroke (P, 3) that says which way feathers lie, and the coat following its strokes."""
     coat = _free(document, coat_id)
-    stroke = Stroke(points=freeze(np.array(points, np.float32)))
-    return set_feathers(document, coat_id, strokes=(*coat.strokes, stroke), direction="strokes")
+    try:
+        return with_feathers(document, coat_with_stroke(coat, points))
+    except (ValueError, TypeError) as error:
+        raise UserError(f"Feathers cannot follow this: {error}.") from error
+
+
+def remove_strokes(document: Document, coat_id: int) -> Document:
+    """The document with the feathers of a coat following their keys again, or else the flow of the body."""
+    coat = _free(document, coat_id)
+    return with_feathers(document, coat_without_strokes(coat, range(len(coat.strokes))))
+
+
+def set_by_hand(document: Document, coat_id: int, roots: Roots) -> Document:
+    """The document with feathers of a coat set at these places by hand."""
+    return with_feathers(document, coat_with_set(_free(document, coat_id), roots))
+
+
+def take_away(document: Document, coat_id: int, ids: ArrayLike) -> Document:
+    """The document without the feathers of these ids that were set by hand; the others keep their ids."""
+    return with_feathers(document, coat_without_set(_free(document, coat_id), ids))
 
 
 def promote_feather(document: Document, coat_id: int, feather: int, plumage: Plumage, frame: float) -> Document:
@@ -233,6 +261,14 @@ def key_feather(
 def demote_feather(document: Document, coat_id: int, feather: int) -> Document:
     """The document with a feather given back to the keys of its coat."""
     return with_feathers(document, demoted(_free(document, coat_id), feather))
+
+
+def demote_all(document: Document, coat_id: int) -> Document:
+    """The document with all feathers of a coat that were animated by hand given back to its keys."""
+    coat = _free(document, coat_id)
+    if not coat.proxies:
+        raise UserError("No feather of this coat was taken over by hand.")
+    return with_feathers(document, coat.replace(proxies=()))
 
 
 def _keys(document: Document, coat: FeatherCoat) -> Groom:

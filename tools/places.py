@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from core.mesh.bvh import cast_rays
 from core.mesh.surface import place_roots, root_frames
-from tools.groom.craft import GroomGround
+from tools.skin_ground import SkinGround
 
 
 class Places(NamedTuple):
@@ -26,7 +26,7 @@ class Places(NamedTuple):
     normals: NDArray[np.float64]
 
 
-def places_under(ground: GroomGround, pixels: ArrayLike) -> Places:
+def places_under(ground: SkinGround, pixels: ArrayLike) -> Places:
     """What lies under pixels (N, 2)."""
     origins, directions = ground.rays(np.asarray(pixels, np.float64))
     _, triangle, barycentric = cast_rays(ground.skin.bvh, origins.astype(np.float32), directions.astype(np.float32))
@@ -40,7 +40,7 @@ def places_under(ground: GroomGround, pixels: ArrayLike) -> Places:
 
 
 def directions_at_rest(
-    ground: GroomGround, triangle: NDArray[np.int32], barycentric: NDArray[np.float32], directions: ArrayLike
+    ground: SkinGround, triangle: NDArray[np.int32], barycentric: NDArray[np.float32], directions: ArrayLike
 ) -> NDArray[np.float64]:
     """Directions (N, 3) of the pose shown, as the skin at those places has them at rest."""
     d = np.asarray(directions, np.float64)

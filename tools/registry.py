@@ -16,12 +16,13 @@ import msgspec
 
 from core.errors import UserError
 from core.field import fields_of
+from tools.feather.craft import FeatherCraft
 from tools.groom.craft import GroomCraft
 from tools.match.craft import MatchCraft
 from tools.pose.craft import PoseCraft
 from tools.tool import Tool
 
-CRAFTS = (GroomCraft, PoseCraft, MatchCraft)  # their tools are in the folders of their names
+CRAFTS = (GroomCraft, FeatherCraft, PoseCraft, MatchCraft)  # their tools are in the folders of their names
 PLUGINS = "FILOPLUME_PLUGINS"  # folders of a studio's own tools, separated as in PATH
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from core.document import Document, MeshObject
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.coat.plumages import Plumages
 from core.formats.arrays import ArrayHashes
 from core.formats.journal import Journal, remove_journal, state_folder
 from core.formats.project import read_project, write_project
@@ -34,6 +35,7 @@ class Session:
     document : the value shown, which during a stroke is a preview.
     workspace : frame, cameras, panels, tool; change it with :meth:`set_workspace`, undo leaves it alone.
     changed : called with the old and the new value after every change of `document`; the one listener there is.
+    plumages : how its coats of feathers lie, for whoever shows or picks them.
     tools : the tools there are. hand : makes their strokes. recording : the macro that is recorded, or None.
     """
 
@@ -53,6 +55,7 @@ class Session:
         self.history: History[Document] = History(document or Document(), name, history_bytes)
         self.workspace = workspace or Workspace()
         self.evaluator = evaluator or Evaluator()
+        self.plumages = Plumages(self.evaluator)
         self.path = path
         self.changed: Listener | None = None
         self._document = self.history.current

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from core.document import Document, MeshObject, find_mesh, keys_of
 from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat
+from core.feather.coat.plumages import Plumages
 from core.feather.pieces import FeatherMesh
 from core.groom.groom import Groom
 from core.mesh.mesh import Mesh
@@ -54,16 +55,16 @@ class Asked(NamedTuple):
 class LiveFeathers:
     """The coats of a document. Mutable; only the functions it hands out run on other threads, one for a coat."""
 
-    def __init__(self, evaluator: Evaluator) -> None:
+    def __init__(self, evaluator: Evaluator, plumages: Plumages | None = None) -> None:
         self._evaluator = evaluator
-        self._plumages: dict[int, object] = {}  # core.feather.coat.plumage.Plumage, whose kernels load with the first
+        self._plumages = Plumages(evaluator) if plumages is None else plumages
         self._laid: dict[int, tuple[Asked, FeatherPicture]] = {}
         self._carried: dict[int, tuple[FeatherPicture, Posed, FeatherPicture]] = {}  # the last one, and what it is of
 
     def follow(self, document: Document) -> None:
         """Forget the coats that are gone."""
         alive = {coat.id for coat in document.feathers}
-        self._plumages = {k: plumage for k, plumage in self._plumages.items() if k in alive}
+        self._plumages.follow(alive)
         self._laid = {k: laid for k, laid in self._laid.items() if k in alive}
         self._carried = {k: carried for k, carried in self._carried.items() if k in alive}
 
@@ -124,14 +125,11 @@ class LiveFeathers:
 
     def _lay(self, asked: Asked, document: Document, frame: float) -> FeatherPicture:
         from core.feather.coat.picture import coat_meshes, rows_of_meshes
-        from core.feather.coat.plumage import Plumage
 
         coat, mesh = asked.coat, asked.item.mesh
-        plumage = self._plumages.setdefault(coat.id, Plumage(self._evaluator))
-        assert isinstance(plumage, Plumage)
         still = asked.points is mesh.points
         skin = skin_at_rest(mesh, self._evaluator) if still else skin_posed(mesh, asked.points, self._evaluator)
-        laid = plumage.at_frame(coat, asked.keys, mesh, skin, frame, float(document.first_frame))
+        laid = self._plumages.lay(coat, asked.keys, mesh, skin, frame, float(document.first_frame)).laid
         rows = tuple(rows for _, rows in rows_of_meshes(laid, coat))
         return FeatherPicture(
             coat_meshes(laid, coat, FINE), coat_meshes(laid, coat, QUICK), rows, laid.bed.roots,

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from core.document import Document, MeshObject, visible_grooms
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.coat.plumages import Plumages
 from core.groom.binding import CoatBinding
 from core.groom.children import Traits
 from core.groom.collision import Collision, collision
@@ -112,14 +113,16 @@ class LiveScene:
 
     Parameters
     ----------
-    evaluator : of the session.
+    evaluator, plumages : of the session.
     frame_bytes : most memory for posed meshes, see :meth:`cached_frames`.
     """
 
-    def __init__(self, evaluator: Evaluator, frame_bytes: int = 256 << 20) -> None:
+    def __init__(
+        self, evaluator: Evaluator, frame_bytes: int = 256 << 20, plumages: Plumages | None = None
+    ) -> None:
         self._evaluator = evaluator
         self._frames = PosedFrames(evaluator, frame_bytes)
-        self._feathers = LiveFeathers(evaluator)
+        self._feathers = LiveFeathers(evaluator, plumages)
         self._grooms: dict[int, _Shown] = {}
         self._skins: dict[tuple[int, bool], Collision] = {}  # by mesh and whether it is at rest, one pose each
         self._asked: dict[tuple[str, int], Job] = {}

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
+from numpy.typing import ArrayLike
 from rapidfuzz import fuzz, process
 
 from core.camera import Camera
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 Touches = Literal["document", "history", "workspace", "file", "settings", "window"]
 # where its hotkey works: the same key may mean different things over different parts of the window, and over the view
 # in different crafts
-Scope = Literal["everywhere", "viewport", "outliner", "curves", "groom", "pose", "match"]
-CRAFT_SCOPES: tuple[Scope, ...] = ("groom", "pose", "match")
+Scope = Literal["everywhere", "viewport", "outliner", "curves", "groom", "feather", "pose", "match"]
+CRAFT_SCOPES: tuple[Scope, ...] = ("groom", "feather", "pose", "match")
 
 MOST_RECENT = 20
 
@@ -66,6 +67,7 @@ class Window(Protocol):
     def look_from(self, side: str) -> None: ...
     def frame_all(self) -> None: ...
     def frame_selected(self) -> None: ...
+    def view_of(self, points: ArrayLike, outward: ArrayLike) -> Camera: ...
     def toggle_projection(self) -> None: ...
     def toggle_gate(self) -> None: ...
     def choose_background(self) -> None: ...

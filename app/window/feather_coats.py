@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from PySide6.QtCore import QObject
 
 from app.window.ask_text import ask_text
@@ -13,6 +14,7 @@ from app.window.jobs import Asked, Progress
 from app.window.window_commands import shown_panels
 from core.document import MeshObject, feathers_of, find_mesh
 from core.errors import UserError
+from core.feather.coat.coat import FeatherCoat
 from core.feather.presets import bird_names, load_bird
 from tools.scene import active_mesh
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from core.feather.coat.dress import Dressed
 
 FEATHERS = 4_000  # of a first coat
+MOST_CROSSINGS = 200  # that are looked at, the worst
 
 
 def dress_with_feathers(desk: Desk, item: MeshObject, bird: str, owner: QObject | None = None) -> None:
@@ -104,6 +107,43 @@ def _remove_tract(window: Window) -> None:
         window.desk.edit("Remove tract", remove_tract, coat.id, coat.tracts[-1].name)
 
 
+def _give_back(window: Window) -> None:
+    from tools.feather_edits import demote_all
+
+    desk = window.desk
+    coat = _coat(desk)
+    if coat is not None:
+        desk.edit("Give feathers back", demote_all, coat.id)
+
+
+def _remove_flow(window: Window) -> None:
+    from tools.feather_edits import remove_strokes
+
+    desk = window.desk
+    coat = _coat(desk)
+    if coat is not None:
+        desk.edit("Remove direction", remove_strokes, coat.id)
+
+
+def _next_crossing(window: Window) -> None:
+    desk = window.desk
+    coat = _coat(desk)
+    lying = None if coat is None else desk.session.plumages.last(coat.id)
+    if lying is None or not len(lying.left.first):
+        desk.said.emit("No feathers cross." if lying is not None else "The feathers are still being laid.")
+        return
+    frames = lying.laid.feathers.frames
+    pairs = np.stack([lying.left.first, lying.left.second], axis=1)
+    cameras = [window.view_of(lying.laid.layered.vanes[pair], frames[pair[0], 2]) for pair in pairs[:MOST_CROSSINGS]]
+    now = desk.workspace.cameras[0].world_from_camera if desk.workspace.cameras else None
+    at = next((k for k, camera in enumerate(cameras) if np.array_equal(camera.world_from_camera, now)), -1)
+    number = (at + 1) % len(cameras)
+    window.look(cameras[number])
+    first, second = lying.laid.ids[pairs[number]]
+    desk.said.emit(
+        f"Crossing {number + 1} of {len(pairs):,}: feathers {first} and {second}. The Shaft tool moves them.")
+
+
 def _draw_direction(window: Window) -> None:
     from tools.feather_edits import strokes_of_keys
 
@@ -119,6 +159,13 @@ def _edit_feather(window: Window) -> None:
         window.toggle_panel("feather")
 
 
+def _coat(desk: Desk) -> FeatherCoat | None:
+    """The coat whose keys are at hand, or the only one there is."""
+    coats = desk.document.feathers
+    coat = feathers_of(desk.document, desk.groom)
+    return coats[0] if coat is None and len(coats) == 1 else coat
+
+
 def _needs_mesh(desk: Desk) -> str | None:
     return None if desk.session.document.meshes else "There is no mesh yet: open or import one first."
 
@@ -127,6 +174,16 @@ def _needs_feathers(desk: Desk) -> str | None:
     if feathers_of(desk.document, desk.groom) is not None:
         return None
     return "No feathers are chosen: dress a mesh with feathers, or choose their keys in the scene."
+
+
+def _needs_taken(desk: Desk) -> str | None:
+    coat = _coat(desk)
+    return None if coat is not None and coat.proxies else "No feather was taken over by hand: the Shaft tool does it."
+
+
+def _needs_strokes(desk: Desk) -> str | None:
+    coat = _coat(desk)
+    return None if coat is not None and coat.strokes else "Nothing was drawn: the Flow tool does it."
 
 
 def _needs_selected(desk: Desk) -> str | None:
@@ -206,4 +263,19 @@ FEATHER_COATS: tuple[Command, ...] = (
         "Lets all feathers follow strokes along the selected keys, instead of every single key.",
         _draw_direction, "tools.feather_edits.strokes_of_keys", "document", "Direction along keys", _needs_selected,
         words="orientation stroke flow comb"),
+    Command(
+        "feathers.remove_direction", "Remove the direction strokes",
+        "Takes all direction strokes away; feathers lie along their keys again, or with the flow of the body.",
+        _remove_flow, "tools.feather_edits.remove_strokes", "document", "Remove direction", _needs_strokes,
+        words="orientation flow comb clear"),
+    Command(
+        "feathers.give_back", "Give all feathers back",
+        "Makes every feather that was taken over by hand procedural again, as its keys lay it.",
+        _give_back, "tools.feather_edits.demote_all", "document", "Give feathers back", _needs_taken,
+        words="proxy demote hand animated release"),
+    Command(
+        "feathers.next_crossing", "Look at the next crossing",
+        "Turns the view to the next pair of feathers that still pass through each other, the worst first.",
+        _next_crossing, "core.feather.coat.layering.crossings", "workspace", None, _needs_feathers,
+        words="intersection penetration worst report layering"),
 )

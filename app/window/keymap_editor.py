@@ -34,7 +34,8 @@ _MODIFIER_KEYS = {
 KEYMAPS = "Keymaps (*.json)"
 WHERE = {
     "everywhere": "everywhere", "viewport": "over the view", "outliner": "in the scene panel",
-    "curves": "at keys and curves", "groom": "over the view, grooming", "pose": "over the view, posing",
+    "curves": "at keys and curves", "groom": "over the view, grooming", "feather": "over the view, feathering",
+    "pose": "over the view, posing",
     "match": "over the view, tracking"}
 
 

@@ -53,11 +53,11 @@ class LivePicture:
         self._size, self._options = (1, 1), ViewOptions()
         self._jobs = 0
         self.session = session
-        self.live = LiveScene(session.evaluator)
+        self.live = LiveScene(session.evaluator, plumages=session.plumages)
 
     def replace_session(self, session: Session) -> None:
         """Show another session from now on; what jobs still bring for the old one is dropped."""
-        self.session, self.live = session, LiveScene(session.evaluator)
+        self.session, self.live = session, LiveScene(session.evaluator, plumages=session.plumages)
         self._jobs = 0
         self._finished = False
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import ArrayLike
 from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
@@ -303,6 +304,10 @@ class MainWindow(QMainWindow):
         """See the selected guides."""
         self.viewport.eye.frame_selected()
 
+    def view_of(self, points: ArrayLike, outward: ArrayLike) -> Camera:
+        """A camera on points (N, 3) from outside."""
+        return self.viewport.eye.view_of(points, outward)
+
     def toggle_projection(self) -> None:
         """A lens or parallel rays."""
         self.viewport.eye.toggle_projection()
@@ -447,7 +452,8 @@ class MainWindow(QMainWindow):
         visible = shown_panels(self.desk.workspace.panels)
         craft = self.desk.session.tool.craft
         shown = {
-            name for name in visible if PANEL_CRAFTS.get(name, craft) == craft and name not in LEFT_OUT.get(craft, ())}
+            name for name in visible
+            if craft in PANEL_CRAFTS.get(name, (craft,)) and name not in LEFT_OUT.get(craft, ())}
         for name, panel in self.panels.items():
             panel.setVisible(name in shown)
         self.column.setVisible(any(name in shown for name in self.panels if name not in AROUND))

@@ -25,8 +25,8 @@ PARTS: dict[str, tuple[Part, ...]] = {
     "frame": (Part("play"), Part("begin_here")),
     "curves": (Part("insert"), Part("auto"), Part("snap_keys"), Part("select_all"), Part("frame_all"), Part("snap")),
     "tool": (
-        Part("plant", "Groom tools"), Part("rotate", "Pose tools"), Part("track_point", "Match tools"),
-        Part("larger"), Part("symmetry")),
+        Part("plant", "Groom tools"), Part("shaft", "Feather tools"), Part("rotate", "Pose tools"),
+        Part("track_point", "Match tools"), Part("larger"), Part("symmetry")),
     "groom": (
         Part("select_all"), Part("freeze_selected"), Part("delete_selected"), Part("spray_selected"), Part("mirror")),
     "pose": (

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from app.window.desk import Desk
 from app.window.jobs import Asked, Progress
@@ -27,6 +27,7 @@ TURN = 0.0075  # radians for a pixel of Qt's
 PULL = 0.006  # of a dolly, in powers of e for a pixel
 NOTCH = 0.86  # of the distance is left after a notch of the wheel
 AHEAD = (0.0, 0.0, 1.0)
+AROUND = 4.0  # times what is looked at fits in the view
 LENS = 0.5  # radians, the vertical field of view to begin with
 
 
@@ -134,6 +135,13 @@ class Eye:
         points = posed[guides.selected].reshape(-1, 3).astype(np.float64)
         self._pivot = points.mean(axis=0)
         self.look(navigate.frame(self.camera, points, self._aspect()))
+
+    def view_of(self, points: ArrayLike, outward: ArrayLike) -> Camera:
+        """A camera on points (N, 3) and as much around them, from the side `outward` (3,) looks to."""
+        places = np.asarray(points, np.float64).reshape(-1, 3)
+        middle = places.mean(axis=0)
+        towards = -np.asarray(outward, np.float64)
+        return frame_points(middle + AROUND * (places - middle), towards, self._aspect(), field_of_view=LENS)
 
     def toggle_projection(self) -> None:
         """A lens or parallel rays; what is looked at keeps its size."""

@@ -16,6 +16,7 @@ from app.window.fields.color_field import ColorField
 from app.window.fields.field_widget import FieldWidget
 from app.window.fields.number_bar import NumberBar
 from app.window.fields.value_field import ValueField
+from app.window.fields.vector_field import VectorField
 from app.window.sections import Row
 from core.field import Field, fields_of
 from core.record import Record
@@ -47,7 +48,7 @@ class RecordForm(QWidget):
         super().__init__(parent)
         self._record, self._before, self._setting = record, record, setting
         self._changes: dict[str, Any] = {}  # of the edit that goes on, which may be of several fields
-        self.fields: dict[str, FieldWidget | ValueField] = {}
+        self.fields: dict[str, FieldWidget | ValueField | VectorField] = {}
         self.rows: dict[str, Row] = {}
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -101,7 +102,7 @@ class RecordForm(QWidget):
                 widget.set_maps(setting.maps)
             elif isinstance(widget, MapBar) and setting.maps != old.maps:
                 widget.set_maps(setting.maps)
-            if setting.unit != old.unit and isinstance(widget, NumberBar | ValueField):
+            if setting.unit != old.unit and isinstance(widget, NumberBar | ValueField | VectorField):
                 widget.set_unit(setting.unit)
 
     def _edited(self, name: str, value: Any, final: bool) -> None:
@@ -137,7 +138,7 @@ class MapBar(ChoiceBar):
 
 def make_field(
     known: Field, hint: Any, value: Any, default: Any = None, setting: Setting = Setting(),
-) -> FieldWidget | ValueField:
+) -> FieldWidget | ValueField | VectorField:
     """The widget for a field of a record, by the type it is annotated with.
 
     A text that may be None is the name of a map.
@@ -156,5 +157,7 @@ def make_field(
     if kind is str:
         return ChoiceBar(known, value, default) if known.choices else TextField(known, value, default)
     if get_origin(kind) is tuple and get_args(kind) == (float, float, float):
+        if known.soft is not None and known.soft[0] < 0.0:  # colours have nothing below 0
+            return VectorField(known, value, default, setting.unit)
         return ColorField(known, value, default)
     raise TypeError(f"there is no field for {known.label} of type {kind}")

@@ -49,6 +49,7 @@ class ViewFigures:
             shown = picture.total if picture.settled else min(picture.shown, picture.total)
             lines.append(f"hairs {picture.total:,}" if shown == picture.total else
                          f"hairs {shown:,} of {picture.total:,}")
+        lines += _of_feathers(self._desk)
         if picture.settled:  # what the last moving picture took says nothing about this one
             lines.append("finished")
         else:
@@ -57,3 +58,15 @@ class ViewFigures:
             lines.append(f"{dab}draw {self.drawing.ms:.0f} ms · {state}")
         lines.append(self.driver)
         return lines + [(trouble, "trouble") for trouble in picture.troubles]
+
+
+def _of_feathers(desk: Desk) -> list[HudLine]:
+    """How many feathers lie on the animals, and what of them still crosses."""
+    found = [desk.session.plumages.last(coat.id) for coat in desk.document.feathers if not coat.hidden]
+    lying = [one for one in found if one is not None]
+    if not lying:
+        return []
+    lines: list[HudLine] = [f"feathers {sum(int(one.laid.shown.sum()) for one in lying):,}"]
+    crossing, inside = sum(len(one.left.first) for one in lying), sum(len(one.left.skin) for one in lying)
+    words = [f"{crossing:,} crossing"] * bool(crossing) + [f"{inside:,} in the skin"] * bool(inside)
+    return lines + ([(" · ".join(words), "trouble")] if words else [])

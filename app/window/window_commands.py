@@ -34,11 +34,12 @@ PANELS = {
     "curves": ("Curves", "Shows or hides the curves of keyed values over the timeline, to be edited together."),
     "timeline": ("Timeline", "Shows or hides frames and playback at the bottom of the window."),
 }
-# panels that belong to one craft; the others are those of all
-PANEL_CRAFTS = {
-    "coat": "groom", "maps": "groom", "feather": "groom", "controls": "pose", "poses": "pose", "library": "pose",
-    "rig": "pose", "pose_map": "pose", "tracks": "match", "solve": "match", "plate": "match",
-    "space": "match", "model": "match",
+_GROWN = ("groom", "feather")
+# panels that belong to some crafts; the others are those of all
+PANEL_CRAFTS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("coat", "maps", "feather"), _GROWN),
+    **dict.fromkeys(("controls", "poses", "library", "rig", "pose_map"), ("pose",)),
+    **dict.fromkeys(("tracks", "solve", "plate", "space", "model"), ("match",)),
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
 AT_FIRST_HIDDEN = ("curves", "feather", "space")

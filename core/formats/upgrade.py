@@ -66,7 +66,7 @@ def feathered_meshes(raw: Raw) -> Raw:
 
 
 def winged_coats(raw: Raw) -> Raw:
-    """8 -> 9: coats of feathers may have wings; as none had, nothing is to be changed."""
+    """8 -> 9: coats may have wings, and ids of feathers set by hand; as none had, nothing is to be changed."""
     return raw
 
 

@@ -25,6 +25,7 @@ from tools.tool import Turn
 REGISTRY = Registry(())
 TOOLS = REGISTRY.tools
 GROOM = [kind.name for kind in REGISTRY.of("groom")]
+FEATHER = [kind.name for kind in REGISTRY.of("feather")]
 POSE = [kind.name for kind in REGISTRY.of("pose")]
 MATCH = [kind.name for kind in REGISTRY.of("match")]
 HIDDEN = {"clone": {"source", "source_groom"}}  # what a stroke leaves in the settings; no panel shows it
@@ -48,7 +49,8 @@ def test_no_file_was_left_out_and_the_names_are_these():
         "track_point", "track_box", "track_plane", "roto", "nudge", "ruler", "track_pattern", "pick_point", "pick_edge",
         "pick_circle", "line_up_axis",
     ]  # fmt: skip
-    assert [*GROOM, *POSE, *MATCH] == list(TOOLS)
+    assert FEATHER == ["shaft", "flow", "tract", "set_feather"]
+    assert [*GROOM, *FEATHER, *POSE, *MATCH] == list(TOOLS)
     assert len({kind.order for kind in TOOLS.values()}) == len(TOOLS)
 
 

@@ -15,9 +15,13 @@ from app.window.commands import Window
 from app.window.craft_panels import CoatPanel
 from app.window.desk import Desk
 from app.window.outliner import Outliner
+from core.camera import project
 from core.document import Document, MeshObject, with_groom
+from core.evaluator import Evaluator
 from core.value import constant
 from tests.core.feather.coat.bodies import egg
+from tests.window.conftest import Opened
+from tools.feather_edits import add_feathers, set_feathers
 from tools.session import Session
 
 COUNT = 60
@@ -106,3 +110,48 @@ def test_selected_keys_give_tracts_and_directions(desk: Desk, monkeypatch: pytes
     direction.run(window)
     assert len(desk.document.feathers[0].strokes) == 3
     assert desk.session.history.undo_name == direction.undo
+
+
+def test_a_hand_takes_a_feather_in_the_view_bends_it_and_gives_it_back(opened: Opened, evaluator: Evaluator) -> None:
+    bare = Document(meshes=(MeshObject(id=1, name="egg", mesh=egg()),))
+    hand = opened(add_feathers(bare, 1, 300, evaluator, keys=12))
+    window, desk = hand.window, hand.window.desk
+    window.commands.run("window.craft_feather")
+    window.look_from("left")
+    hand.finish()
+    assert [name for name in ("coat", "tool") if window.panels[name].isVisible()] == ["coat", "tool"]
+    assert not window.panels["controls"].isVisible()
+    assert hand.view.picture is not None
+    assert "feathers 300" in window.viewport.figures.lines(hand.view.picture)
+    hand.drag((0.5, 0.5), (0.55, 0.42))
+    taken = desk.document.feathers[0].proxies
+    assert len(taken) == 1
+    assert (taken[0].shafts[0] != taken[0].rest).any()
+    assert desk.session.history.undo_name == "Pose feather"
+    hand.finish()
+    window.commands.run("feathers.give_back")
+    assert desk.document.feathers[0].proxies == ()
+    desk.session.undo()
+    desk.session.undo()
+    assert desk.document.feathers[0].proxies == ()
+
+
+def test_crossings_that_are_left_are_looked_at_one_after_another(opened: Opened, evaluator: Evaluator) -> None:
+    bare = Document(meshes=(MeshObject(id=1, name="egg", mesh=egg()),))
+    wild = set_feathers(add_feathers(bare, 1, 120, evaluator, keys=12), 1, layered=False, variation=4.0)
+    hand = opened(wild)
+    hand.finish()
+    window, desk = hand.window, hand.window.desk
+    lying = desk.session.plumages.last(1)
+    assert lying is not None
+    assert len(lying.left.first) > 3
+    said: list[str] = []
+    desk.said.connect(said.append)
+    for number in range(2):
+        window.commands.run("feathers.next_crossing")
+        pair = [lying.left.first[number], lying.left.second[number]]
+        first, second = lying.laid.ids[pair]
+        assert f"feathers {first} and {second}" in said[-1]
+        camera = desk.workspace.cameras[0]
+        pixels = project(camera, lying.laid.layered.vanes[pair].reshape(-1, 3), 400, 300)
+        np.testing.assert_allclose(pixels.xy.mean(axis=0), [200.0, 150.0], atol=60.0)

@@ -4,38 +4,32 @@ respected."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.camera import clip_from_world
 from core.document import Document, mesh_to_edit, with_groom
 from core.errors import UserError
 from core.groom.groom import Groom
 from core.groom.guides import Guides
-from core.groom.region import View
-from core.mesh.bvh import closest_points
 from core.mesh.distance_field import DistanceField
 from core.posed import field_at, field_known, skin_at
-from core.transform import normalized
 from core.workspace import Respect
 from tools.craft import Work
-from tools.ground import Hit, Pointer, Sight
+from tools.ground import Sight
 from tools.map_edits import map_to_paint, paint_map
 from tools.posed_guides import BackToRest, in_pose
 from tools.respect import Edits, respected, restored
 from tools.screen import Screen
-from tools.skin_ground import SkinGround
+from tools.skin_ground import TwoSidedGround, both_sides
 from tools.tool import Tool
-
-MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])  # across the object's own X = 0 plane
 
 
 @dataclass(frozen=True, kw_only=True)
-class GroomGround(SkinGround):
+class GroomGround(TwoSidedGround):
     """What a stroke of grooming works on.
 
     guides : at press, in the pose shown (at rest for tools with ``at_rest``), with what is not respected taken off.
@@ -48,54 +42,6 @@ class GroomGround(SkinGround):
     respect: Respect
     at_rest: bool = False
     waits: bool = True
-
-    def begun(self, pointer: Pointer) -> GroomGround:
-        """On the mirrored side of a pose: looked at as if the skin opposite to where the stroke begins were here.
-
-        Sides are those of rest. A part that turns as a whole, as a head does, is mirrored exactly; a stroke that goes
-        on over a joint keeps the image it began with.
-        """
-        if not self.mirrored or self.skin is self.rest:
-            return self
-        sight = self.sight
-        own = View(clip_from_world(sight.camera, sight.width, sight.height), sight.width, sight.height)
-        near = replace(self, view=own, mirrored=False)
-        hit = near.hit(pointer)
-        if hit is None:  # beside the animal: the skin nearest to the pointer
-            pixels, depth = own.pixels(self.skin.points)
-            away = np.hypot(pixels[:, 0] - pointer.x, pixels[:, 1] - pointer.y)
-            nearest = self.skin.points[np.argmin(np.where(depth > 0.0, away, np.inf))]
-            triangle, weights, _ = closest_points(self.skin.bvh, nearest[None])
-            hit = Hit(int(triangle[0]), weights[0], nearest.astype(np.float64), np.zeros(3))
-        return replace(self, view=own._replace(clip_from_object=own.clip_from_object @ self._image(hit)))
-
-    def opposite(self, hit: Hit) -> NDArray[np.float64]:
-        """The point (3,) of the skin that lies on the other side at rest, where it is now."""
-        if self.skin is self.rest:
-            return super().opposite(hit)
-        return np.asarray((np.linalg.inv(self._image(hit)) @ [*hit.point, 1.0])[:3])
-
-    def _image(self, hit: Hit) -> NDArray[np.float64]:
-        """(4, 4) what the skin around the place opposite to a hit must be moved by to be the mirror image of the skin
-        around the hit, in the pose shown."""
-        turn, at_rest, posed = self._turned(hit.triangle, hit.barycentric)
-        triangle, weights, _ = closest_points(self.rest.bvh, (at_rest * MIRROR.diagonal()[:3])[None].astype(np.float32))
-        other_turn, _, other = self._turned(int(triangle[0]), weights[0])
-        image = np.eye(4)
-        image[:3, :3] = turn @ MIRROR[:3, :3] @ other_turn.T
-        image[:3, 3] = posed - image[:3, :3] @ other
-        return image
-
-    def _turned(self, triangle: int, weights: NDArray[np.float32]) -> tuple[NDArray[np.float64], ...]:
-        """How a triangle is turned from rest to the pose (3, 3), and a place of it at rest and in the pose, (3,)."""
-        corners = self.rest.triangles.vertices[triangle]
-        frames, places = [], []
-        for points in (self.rest.points, self.skin.points):
-            a, b, c = points[corners].astype(np.float64)
-            along, normal = normalized(b - a), normalized(np.cross(b - a, c - a))
-            frames.append(np.stack([along, np.cross(normal, along), normal], axis=1))
-            places.append(weights.astype(np.float64) @ points[corners])
-        return frames[1] @ frames[0].T, places[0], places[1]
 
     @property
     def seed(self) -> int:
@@ -160,15 +106,13 @@ class GroomCraft:
         guides = respected(groom.guides, workspace.respect, cast(Edits, tool.edits))
         if not tool.at_rest and skin is not rest:
             guides = in_pose(guides, skin)
-        matrix = clip_from_world(sight.camera, sight.width, sight.height)
-        sides = (matrix, matrix @ MIRROR) if workspace.respect.symmetry else (matrix,)
         grounds = tuple(
             GroomGround(
-                sight, View(side, sight.width, sight.height), document.unit, side is not matrix, item=item,
+                sight, view, document.unit, mirrored, item=item,
                 frame=frame, skin=skin, rest=rest, evaluator=evaluator, groom=groom, guides=guides,
                 respect=workspace.respect, at_rest=tool.at_rest, waits=waits,
             )
-            for side in sides
+            for view, mirrored in both_sides(sight, workspace.respect.symmetry)
         )
         self._known = (key, grounds)
         return grounds

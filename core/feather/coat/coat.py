@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 import numpy as np
@@ -26,7 +27,8 @@ class Placement(Record):
 
     density_map, field_map : names of maps of the keys' groom; `field_map` is what kind "field" follows.
     tract : name of the tract feathers are kept in, or None.
-    hand : the places of kind "hand".
+    hand : the places of kind "hand". hand_ids : (N,) int32, ascending, their ids within the placement, below `count`,
+        which counts all that were ever set; None while none was taken away.
     """
 
     kind: Annotated[str, field(
@@ -46,6 +48,7 @@ class Placement(Record):
     field_map: str | None = None
     tract: str | None = None
     hand: Roots | None = None
+    hand_ids: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in PLACEMENTS:
@@ -54,6 +57,10 @@ class Placement(Record):
         number(self, "seed", least=0, most=2**31 - 1)
         if (self.kind == "hand") != (self.hand is not None):
             raise ValueError("Placement.hand holds the places of kind hand, and of no other")
+        if self.hand_ids is not None:
+            column(self, "hand_ids", np.int32, (0 if self.hand is None else len(self.hand.faces),))
+            if np.any(np.diff(self.hand_ids, prepend=-1, append=self.count) <= 0):
+                raise ValueError("Placement.hand_ids ascend from 0 and stay below count")
         if self.kind == "field" and self.field_map is None:
             raise ValueError("Placement.field_map names the map that kind field follows")
 
@@ -74,6 +81,11 @@ class Tract(Record):
         if not len(self.line):
             raise ValueError("Tract.line needs a point at least")
         number(self, "width", least=0.0)
+
+    @property
+    def part(self) -> str:
+        """The part of the bird it is called after: its name without a number at the end."""
+        return re.sub(r"[ _]\d+$", "", self.name)
 
 
 class Stroke(Record):

@@ -1,7 +1,7 @@
 """Where feathers stand: every kind of placement, exact in number, with ids that stay.
 
-The row of a place within its placement is its id: it is the same whatever share of the feathers is kept, however many
-threads there are, and after the coat was read from a file.
+The row of a place within its placement is its id (feathers set by hand have ids of their own): it is the same whatever
+share of the feathers is kept, however many threads there are, and after the coat was read from a file.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def place_feathers(coat: FeatherCoat, mesh: Mesh, maps: Maps, evaluator: Evaluat
     ids, found = [], []
     for number, placement in enumerate(coat.placements):
         places = _placed(placement, coat, mesh, maps, evaluator)
-        ids.append(number * IDS + np.arange(len(places.triangle), dtype=np.int64))
+        own = placement.hand_ids
+        ids.append(number * IDS + (np.arange(len(places.triangle)) if own is None else own).astype(np.int64))
         found.append(places)
     if not found:
         return Places(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3), np.float32))

@@ -285,8 +285,8 @@ class Plumage:
         worn = load_bird(coat.preset).feathers
         table = np.tile(worn_values(coat, worn["body"])[: len(SHAPE_COLUMNS)], (len(bed.places.ids), 1))
         for number, tract in enumerate(coat.tracts):
-            if tract.name in worn:  # a tract called as a part of the bird wears what that part wears
-                table[bed.tract == number + 1] = worn_values(coat, worn[tract.name])[: len(SHAPE_COLUMNS)]
+            if tract.part in worn:  # a tract called as a part of the bird wears what that part wears
+                table[bed.tract == number + 1] = worn_values(coat, worn[tract.part])[: len(SHAPE_COLUMNS)]
         for name, column in SHAPE_COLUMNS.items():
             if name in fields:
                 table[:, column] = fields[name]

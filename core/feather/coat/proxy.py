@@ -7,15 +7,19 @@ while nobody has moved it, it is the same feather to the bit, and so are all oth
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.feather.coat.coat import FeatherCoat, Proxy
-from core.feather.coat.layering import Feathers, Layered, layer_around
 from core.mesh.bvh import Bvh
 from core.record import freeze
 from core.workers import Workers
+
+if TYPE_CHECKING:  # its kernels load with the first coat; a hand takes feathers over without
+    from core.feather.coat.layering import Feathers, Layered
 
 POINTS = 8  # of a shaft that is animated by hand
 
@@ -79,6 +83,8 @@ def apply_proxies(
 
     frames : (N, 3, 3) float32, of the roots without yaw, as proxies were taken in.
     """
+    from core.feather.coat.layering import layer_around
+
     rows, vanes = [], laid.vanes.copy()
     for proxy in coat.proxies:
         row = int(np.searchsorted(ids, proxy.id))

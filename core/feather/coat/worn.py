@@ -28,7 +28,7 @@ LIKE = {
 def parts_of(coat: FeatherCoat) -> tuple[str, ...]:
     """Parts of the bird by the number that the column ``tract`` of a laid coat has: body, tracts, parts of wings."""
     parts = sorted({row.part for wing in coat.wings for row in wing.rows})
-    return ("body", *(tract.name for tract in coat.tracts), *parts)
+    return ("body", *(tract.part for tract in coat.tracts), *parts)
 
 
 def worn_preset(coat: FeatherCoat, part: str = "body") -> str:
