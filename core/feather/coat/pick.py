@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from core.feather.coat.plumage import Laid
+    from core.feather.coat.winged import Laid
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,8 @@ from core.mesh.skin import Skin
 
 if TYPE_CHECKING:  # its kernels load with the first coat, a window starts without them
     from core.feather.coat.layering import Crossings
-    from core.feather.coat.plumage import Laid, Plumage
+    from core.feather.coat.plumage import Plumage
+    from core.feather.coat.winged import Laid
 
 
 class Lying(NamedTuple):
