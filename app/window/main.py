@@ -105,6 +105,7 @@ class MainWindow(QMainWindow):
         self.photographer: Photographer | None = None
         self._keeps_place = True
         self.viewport = Viewport(self.desk, self.hotkeys, self.commands, self, settings.density_ms)
+        self.viewport.plate.screen.set_budget(settings.frames_mb << 20)
         self.top = TopBar(self.desk, self.commands, self.hotkeys)
         self.shelf = Shelf(self.desk, lambda tool: self.hotkeys.keymap.shown(f"tool.{tool}"))
         self.view = ViewHost(self.viewport, self)
@@ -410,6 +411,7 @@ class MainWindow(QMainWindow):
             self._show_unit()
         self.desk.session.history.budget = new.history_mb << 20
         self.viewport.set_budget(new.density_ms)
+        self.match.screen.set_budget(new.frames_mb << 20)
         self._use_pen()
         if self._preferences is not None:
             self._preferences.refresh()

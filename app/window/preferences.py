@@ -108,7 +108,7 @@ class Preferences(QDialog):
 
     def _work(self) -> QWidget:
         page, rows = _page()
-        for name in ("history_mb", "density_ms"):
+        for name in ("history_mb", "frames_mb", "density_ms"):
             rows.addWidget(self._setting(name))
         rows.addStretch(1)
         return page

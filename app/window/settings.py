@@ -50,6 +50,9 @@ class Settings(Record):
     history_mb: Annotated[int, field(
         "Undo, MB", "Megabytes kept for undo; the oldest steps are forgotten beyond it.", "", (128, 4096),
         (16, 65536), 128)] = DEFAULT_BUDGET >> 20
+    frames_mb: Annotated[int, field(
+        "Frames, MB", "Megabytes of frames of plates held in memory, as shown and as tracked.",
+        "", (512, 16384), (64, 262144), 256)] = 2048
     density_ms: Annotated[float, field(
         "Picture, ms", "Milliseconds a picture may take while your hand moves; more shows more hair.", "",
         (10, 60), (5, 500), 1)] = 28.0
@@ -62,6 +65,7 @@ class Settings(Record):
     def __post_init__(self) -> None:
         number(self, "text_size", least=10, most=20)
         number(self, "history_mb", least=16, most=65536)
+        number(self, "frames_mb", least=64, most=262144)
         number(self, "density_ms", least=5.0, most=500.0)
 
     def opened(self, path: str | os.PathLike[str]) -> Settings:

@@ -15,6 +15,11 @@ from core.errors import UserError
 
 Read = Callable[[int], NDArray[Any]]
 DEFAULT_BUDGET = 2 << 30
+POLL = 0.02  # s between two looks of somebody who waits whether it is still wanted
+
+
+class GivenUp(Exception):
+    """Somebody who waited for a frame does not want it any more."""
 
 
 class FrameCache:
@@ -34,11 +39,15 @@ class FrameCache:
         self._bytes = self._largest = 0
         self._last: int | None = None
         self._lock = threading.Lock()
+        self._closed = False
         self._reader = ThreadPoolExecutor(1, thread_name_prefix="frames")
 
-    def get(self, frame: int) -> NDArray[Any] | None:
+    def get(self, frame: int, given_up: Callable[[], bool] | None = None) -> NDArray[Any] | None:
         """The pixels of a frame, read-only; None for a broken one. Frames on from here, in the direction of the last
-        two calls, are read ahead."""
+        two calls, are read ahead.
+
+        given_up : asked while the frame is waited for; once it says True, :class:`GivenUp` is raised.
+        """
         with self._lock:
             direction = -1 if self._last is not None and frame < self._last else 1
             self._last = frame
@@ -52,7 +61,22 @@ class FrameCache:
                 room = self._bytes + (len(self._coming) + 2) * self._largest <= self.budget or n == 1
                 if near in self.frames and near not in self._held and near not in self.broken and room:
                     self._want(near)
-        return coming.result() if coming is not None else found
+        if coming is None:
+            return found
+        while given_up is not None:
+            try:
+                return coming.result(POLL)
+            except TimeoutError:
+                if given_up():
+                    raise GivenUp from None
+        return coming.result()
+
+    def expect(self, frame: int) -> None:
+        """Read a frame soon that is not held yet, if there is room for it; nobody waits."""
+        with self._lock:
+            room = self._bytes + (len(self._coming) + 1) * self._largest <= self.budget
+            if room and not self._closed and frame in self.frames and not (frame in self._held or frame in self.broken):
+                self._want(frame)
 
     def knows(self, frame: int) -> bool:
         """True when :meth:`get` would answer at once."""
@@ -66,6 +90,8 @@ class FrameCache:
 
     def close(self) -> None:
         """Forget everything and end the thread."""
+        with self._lock:
+            self._closed = True
         self._reader.shutdown(cancel_futures=True)
         self._held.clear()
         self._bytes = 0

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from core.match.track import TrackSettings, keyed_track
 from core.match.tracker import Tracking
 from core.workers import Workers
 from tests.bench.bench import Row
+from tests.display import ensure_display
 
 TITLE = "Pattern tracker"
 
@@ -44,6 +46,7 @@ def run() -> list[Row]:
         least = None if peer is None else 0.8 * peer["ms_per_track_frame"]
         rows.append(Row(f"{plate.name}: time of track and frame", ours["ms_per_track_frame"], "ms", least))
     rows.append(Row("click to a track over the next second, frames in memory", _click(plates[0]), "ms", 100.0))
+    rows += _in_the_window(plates[0])
     for kind, values in pooled.items():
         if values:
             rows.append(
@@ -74,6 +77,50 @@ def _click(plate: Path) -> float:
     decoder.close()
     workers.close()
     return float(np.median(times[1:]))
+
+
+def _in_the_window(plate: Path) -> list[Row]:
+    """From a click on the picture to the track over the next second on the screen, and from cancel to the end of it."""
+    reason = ensure_display()
+    if reason is not None:
+        raise UserError(reason)
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FILOPLUME_STATE"] = os.environ["FILOPLUME_SETTINGS"] = folder
+        from PySide6.QtTest import QTest
+
+        from tests.window.alone import hand_at
+
+        hand = hand_at(None, (1600, 1000))
+        window, desk, tracking = hand.window, hand.window.desk, hand.window.match.tracking
+        painted = [0.0]
+        hand.view.painted.connect(lambda: painted.__setitem__(0, time.perf_counter()))
+        window.opening.open(plate)
+        hand.until(lambda: bool(desk.document.plates), 60_000)
+        window.commands.run("tool.track_point")
+        first = desk.document.first_frame
+        for frame in (*range(first, first + 26), first):
+            desk.set_workspace(frame=float(frame))
+            hand.finish()
+        clicks, cancels = [], []
+        for x, y in ((0.4, 0.4), (0.5, 0.5), (0.6, 0.45), (0.45, 0.6), (0.55, 0.55), (0.35, 0.5), (0.62, 0.6)):
+            QTest.qWait(300)
+            start = time.perf_counter()
+            hand.press((x, y))
+            hand.release((x, y))
+            window.commands.run("match.forward")
+            hand.until(lambda: not tracking.running or max((len(t) for t in tracking.tails()), default=0) >= 25)
+            made = time.perf_counter()
+            hand.until(lambda made=made: painted[0] > made)
+            clicks.append(1e3 * (painted[0] - start))
+            if tracking.job is not None and tracking.running:
+                start = time.perf_counter()
+                desk.jobs.cancel(tracking.job)
+                hand.until(lambda: not tracking.running)
+                cancels.append(1e3 * (time.perf_counter() - start))
+            hand.finish()
+        window.close_unasked()
+    rows = [Row("click to a track over the next second, on the screen", float(np.median(clicks[1:])), "ms", 100.0)]
+    return rows + [Row("cancel of tracking, the longest", max(cancels), "ms", 200.0)] * bool(cancels)
 
 
 def _ours(plate: Path, blur: bool) -> dict:

@@ -9,16 +9,13 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from app.window.desk import Desk
-from app.window.jobs import Cancelled
-from core.formats.frame_decoder import FrameDecoder
-from core.formats.plate_file import PlateFrames
-from core.image.frame_cache import FrameCache, no_pixels
+from app.window.jobs import Asked, Cancelled, Progress
+from app.window.match.reel import Reel
+from core.image.frame_cache import GivenUp, no_pixels
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
-from viewport.plate_color import PlateColors
 
-BUDGET = 1 << 30  # bytes of frames as shown
-AHEAD = 8
+BUDGET = 2 << 30  # bytes of frames, where nobody says otherwise
 
 
 class Shown(NamedTuple):
@@ -29,29 +26,10 @@ class Shown(NamedTuple):
     words: str = ""
 
 
-class _Reel:
-    """One opened plate: its frames as they are in the files, and as the screen shows them."""
-
-    def __init__(self, plate: Plate, root: Any) -> None:
-        self.plate = plate
-        self.colors = PlateColors()
-        self.decoder = FrameDecoder()
-        self.source = PlateFrames(plate, self.decoder, root=root, ahead=0)
-        self.frames = FrameCache(self._read, plate.frames, BUDGET, AHEAD)
-
-    def _read(self, frame: int) -> NDArray[np.uint8]:
-        return self.colors.display(self.source.read(frame), self.plate.color_space)
-
-    def close(self) -> None:
-        self.frames.close()
-        self.source.close()
-        self.decoder.close()
-
-
 class PlateScreen(QObject):
     """The frames of the plate in view.
 
-    fresh : a frame that was asked for is there.
+    fresh : a frame that was asked for is there. budget : bytes that all frames held may take.
     """
 
     fresh = Signal()
@@ -59,7 +37,8 @@ class PlateScreen(QObject):
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk)
         self._desk = desk
-        self._reel: _Reel | None = None
+        self.budget = BUDGET
+        self._reel: Reel | None = None
         self._key: tuple[Any, ...] = ()
         self._asked: int | None = None
         self._last: Shown | None = None
@@ -75,9 +54,9 @@ class PlateScreen(QObject):
         reel = self._opened(plate)
         if frame not in plate.frames:
             return Shown(frame, self._blank(plate), f"The plate has frames {plate.first} to {plate.last}.")
-        if reel.frames.knows(frame):
-            pixels = reel.frames.get(frame)
-            words = "" if pixels is not None else f"Frame {frame}: {reel.frames.broken.get(frame, 'it is missing.')}"
+        if reel.shown.knows(frame):
+            pixels = reel.shown.get(frame)
+            words = "" if pixels is not None else f"Frame {frame}: {reel.shown.broken.get(frame, 'it is missing.')}"
             self._last = Shown(frame, self._blank(plate) if pixels is None else pixels, words)
             return self._last
         if self._asked is None:
@@ -88,17 +67,27 @@ class PlateScreen(QObject):
         """Frames of the desk that are in memory."""
         reel = self._reel
         return () if reel is None else tuple(
-            f + reel.plate.offset for f in reel.plate.frames if reel.frames.knows(f))
+            f + reel.plate.offset for f in reel.plate.frames if reel.shown.knows(f))
 
     def pixels(self, plate: Plate, frame: int) -> NDArray[np.uint8] | None:
         """A frame that is in memory, without asking for it."""
         reel = self._opened(plate)
-        return reel.frames.get(frame) if frame in plate.frames and reel.frames.knows(frame) else None
+        return reel.shown.get(frame) if frame in plate.frames and reel.shown.knows(frame) else None
+
+    def reel(self, plate: Plate) -> Reel:
+        """Where frames of a plate come from, for a job: those that were looked at are there already."""
+        return self._opened(plate)
+
+    def set_budget(self, size: int) -> None:
+        """Hold so many bytes of frames, from the next picture on."""
+        if size != self.budget:
+            self.budget = size
+            self.close()
 
     def want(self, plate: Plate, frame: int) -> None:
         """Read a frame when nothing else is asked for."""
         reel = self._opened(plate)
-        if frame in plate.frames and self._asked is None and not reel.frames.knows(frame):
+        if frame in plate.frames and self._asked is None and not reel.shown.knows(frame):
             self._ask(reel, frame)
 
     def close(self) -> None:
@@ -107,7 +96,7 @@ class PlateScreen(QObject):
             self._reel.close()
         self._reel, self._asked, self._last = None, None, None
 
-    def _ask(self, reel: _Reel, frame: int) -> None:
+    def _ask(self, reel: Reel, frame: int) -> None:
         self._asked = frame
 
         def done(found: Any) -> None:
@@ -121,17 +110,23 @@ class PlateScreen(QObject):
                 if not isinstance(error, Cancelled):
                     self._desk.error(error)
 
-        self._desk.jobs.start(
-            f"Read frame {frame}", lambda progress, cancelled: reel.frames.get(frame), done, failed, self)
+        def read(progress: Progress, cancelled: Asked) -> None:
+            try:
+                reel.shown.get(frame, cancelled)
+            except GivenUp:
+                raise Cancelled from None
 
-    def _opened(self, plate: Plate) -> _Reel:
+        self._desk.jobs.start(f"Read frame {frame}", read, done, failed, self)
+
+    def _opened(self, plate: Plate) -> Reel:
         path = self._desk.session.path
         root = None if path is None else path.parent
         key = (plate.path, plate.first, plate.last, plate.width, plate.height, plate.crop, plate.color_space,
                plate.offset, root)
         if self._reel is None or key != self._key:
             self.close()
-            self._reel, self._key = _Reel(plate, root), key
+            self._reel, self._key = Reel(plate, root, self.budget), key
+        self._reel.mix = plate.mix
         return self._reel
 
     def _blank(self, plate: Plate) -> NDArray[np.uint8]:

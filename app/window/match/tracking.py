@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.window.desk import Desk
 from app.window.jobs import Asked, Cancelled, Job, Progress
+from app.window.match.reel import Reel
+from app.window.match.screen import PlateScreen
 from core.errors import UserError
-from core.formats.frame_decoder import FrameDecoder
-from core.formats.plate_file import PlateFrames
-from core.image.mix import mixed
+from core.image.frame_cache import GivenUp
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
 from core.match.follow import Stretch, Way, stretch_of, with_found
@@ -32,13 +31,14 @@ STEPS = {
     "forward": "Track forward", "backward": "Track backward", "next": "Track one frame on",
     "previous": "Track one frame back", "between": "Track between keys", "both": "Track both ways",
 }
+SHOWN_EVERY = 40  # ms; a picture takes the time in which many more points are made
 
 
 class Work:
     """What a job needs of a plate and its marks; made on the thread of the window, used on another."""
 
-    def __init__(self, plate: Plate, root: Path | None, masks: tuple[Mask, ...]) -> None:
-        self.plate, self.root, self.masks = plate, root, masks
+    def __init__(self, plate: Plate, reel: Reel, masks: tuple[Mask, ...]) -> None:
+        self.plate, self.reel, self.masks = plate, reel, masks
 
     def run(
         self, tasks: tuple[Stretch, ...], settings: TrackSettings, auto: int, steps: deque[Step], progress: Progress,
@@ -84,20 +84,18 @@ class Work:
     @contextmanager
     def _opened(self, cancelled: Asked) -> Iterator[Callable[[int], NDArray[np.float32] | None]]:
         """What reads the frames as tracking looks at them, and ends with a cancelled job."""
-        decoder = FrameDecoder()
-        source = PlateFrames(self.plate, decoder, root=self.root)
+        with self.reel.reading() as reel:
+            seen = reel.seen(self.plate.mix)
 
-        def read(frame: int) -> NDArray[np.float32] | None:
-            if cancelled():
-                raise Cancelled
-            pixels = source.get(frame)
-            return None if pixels is None else mixed(pixels, self.plate.mix)
+            def read(frame: int) -> NDArray[np.float32] | None:
+                if cancelled():
+                    raise Cancelled
+                try:
+                    return seen.get(frame, cancelled)
+                except GivenUp:
+                    raise Cancelled from None
 
-        try:
             yield read
-        finally:
-            source.close()
-            decoder.close()
 
     def _held(self, frame: int) -> NDArray[np.bool_] | None:
         width, height = plate_size(self.plate)
@@ -107,17 +105,19 @@ class Work:
 class MatchTracking(QObject):
     """Begins tracking jobs of a desk and shows what they make.
 
-    made : points were made.
+    screen : where the frames come from. made : points were made.
     """
 
     made = Signal()
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, screen: PlateScreen) -> None:
         super().__init__(desk)
-        self.desk = desk
+        self.desk, self._screen = desk, screen
         self.job: Job | None = None
         self._steps: deque[Step] = deque()
         self._tails: dict[int, list[tuple[int, NDArray[np.float64]]]] = {}
+        self._show = QTimer(self, interval=SHOWN_EVERY, singleShot=True)
+        self._show.timeout.connect(self.made)
         desk.jobs.changed.connect(self._listen)
 
     @property
@@ -215,9 +215,8 @@ class MatchTracking(QObject):
             name, lambda progress, cancelled: work.run(tasks, settings, auto, steps, progress, cancelled), done)
 
     def _work(self, plate: Plate) -> Work:
-        path = self.desk.session.path
         masks = tuple(m for m in self.desk.document.masks if m.plate_id == plate.id)
-        return Work(plate, None if path is None else path.parent, masks)
+        return Work(plate, self._screen.reel(plate), masks)
 
     def _begin(self, name: str, function: Callable[[Progress, Asked], Any], done: Callable[[Any], None]) -> None:
         def failed(error: Exception) -> None:
@@ -240,11 +239,15 @@ class MatchTracking(QObject):
             step = self._steps.popleft()
             for number, point in zip(step.tracks, step.points, strict=True):
                 self._tails.setdefault(int(number), []).append((step.frame, point))
-        self.made.emit()
+        if not self._show.isActive():
+            self._show.start()
 
     def _forget(self) -> None:
+        shown = bool(self._tails)
         self._steps, self._tails = deque(), {}
-        self.made.emit()
+        self._show.stop()
+        if shown:
+            self.made.emit()
 
 
 def _stopped_by(cancelled: Asked) -> Callable[[int, Callable[[int, int], object], int], None]:

@@ -47,7 +47,7 @@ class PlateView(QObject):
         self.desk = desk
         self.eye = PlateEye(desk, size, self.fresh.emit)
         self.screen = PlateScreen(desk)
-        self.tracking = MatchTracking(desk)
+        self.tracking = MatchTracking(desk, self.screen)
         self.solving = SolveJob(desk)
         self.model = ModelJob(desk, window)
         self.doors = MatchDoors(desk, window)

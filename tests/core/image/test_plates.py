@@ -1,6 +1,7 @@
 """Plates from disk: numbers of frames, what is missing or broken, depths, movies, the bounded cache."""
 
 import shutil
+import threading
 from fractions import Fraction
 
 import av
@@ -14,7 +15,7 @@ from PIL.TiffImagePlugin import IFDRational
 from core.errors import UserError
 from core.formats.frame_decoder import FrameDecoder
 from core.formats.plate_file import PlateFrames, read_plate
-from core.image.frame_cache import FrameCache
+from core.image.frame_cache import FrameCache, GivenUp
 from core.image.mix import mixed
 from core.image.plate import ChannelMix, frame_name
 
@@ -169,3 +170,31 @@ def test_focal_length_and_film_back_come_from_exif(tmp_path, decoder, told, film
     assert plate.focal_mm == (pytest.approx(told[0]) if told[0] else None)
     # 4.2 mm that is like 26 mm on 36 x 24: a diagonal of 43.267 * 4.2 / 26 mm, four to three
     assert plate.film_back == (None if film is None else pytest.approx(film, abs=2e-3))
+
+
+def test_who_waits_for_a_frame_may_give_up_and_a_frame_may_be_expected():
+    begun, go_on = threading.Event(), threading.Event()
+
+    def read(frame):
+        begun.set()
+        assert go_on.wait(10)
+        return np.full((2, 2, 3), frame, np.uint8)
+
+    cache = FrameCache(read, range(1, 9), budget=1000, ahead=0)
+    with pytest.raises(GivenUp):
+        cache.get(3, begun.is_set)
+    cache.expect(5)
+    cache.expect(99)
+    go_on.set()
+    assert (cache.get(3, lambda: False) == 3).all()
+    assert (cache.get(5) == 5).all()
+    assert not cache.knows(99)
+    full = FrameCache(lambda frame: np.zeros((2, 2, 3), np.uint8), range(1, 9), budget=12, ahead=0)
+    full.get(1)
+    full.expect(2)
+    assert full.get(1) is not None
+    assert not full.knows(2)
+    full.close()
+    cache.close()
+    cache.expect(7)
+    assert not cache.knows(7)
