@@ -51,6 +51,7 @@ class ViewOptions(Record):
     methods of ``core.pose.compare`` shown side by side, none for the usual single view.
     isolated : ids of the only meshes shown (with their grooms), empty for all; ghosted : ids shown translucent.
     background : path of an image behind everything, or None.
+    over_plate : opacity, 0 .. 1, of the scene over a plate whose camera is solved.
     gate : of a film camera, or None. safe_areas : whether it shows where action and titles are safe.
     """
 
@@ -71,8 +72,10 @@ class ViewOptions(Record):
     gate: Gate | None = None
     gate_shown: bool = True
     safe_areas: bool = False
+    over_plate: float = 1.0
 
     def __post_init__(self) -> None:
+        number(self, "over_plate", least=0.0, most=1.0)
         if self.shading not in SHADINGS:
             raise ValueError(f"ViewOptions.shading must be one of {', '.join(SHADINGS)}, not {self.shading!r}")
 

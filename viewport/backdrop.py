@@ -62,6 +62,7 @@ class Backdrop:
         set_uniforms(self.resolve, {
             **self._uniforms(scene, size), "samples": 0, "samples_per_side": samples,
             "origin": (float(tile[0]), float(tile[1])), "exposure": scene.exposure,
+            "clear": scene.clear,
         })
         self.resolve_triangle.render(moderngl.TRIANGLES, vertices=3)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from core.overlay import Overlay
 from viewport.backdrop import picture_texture
+from viewport.through_lens import Bent, ThroughLens
 from viewport.view import HudLine, View3D
 
 SHARP_FROM = 3.0  # pixels of the screen for one of the plate: from here on they are shown as squares
@@ -34,14 +35,18 @@ class PlatePicture:
         self.view = view
         self._pixels: NDArray[np.uint8] | None = None
         self._texture: moderngl.Texture | None = None
+        self._through: ThroughLens | None = None
         self._insets: list[tuple[NDArray[np.uint8], moderngl.Texture]] = []
 
     def present(
         self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], pixels: NDArray[np.uint8] | None, box: Box,
         overlays: Sequence[Overlay] = (), hud: Sequence[HudLine] = (), ratio: float = 1.0,
-        insets: Sequence[Inset] = (),
+        insets: Sequence[Inset] = (), bent: Bent | None = None,
     ) -> None:
-        """Draw a frame (H, W, 3) uint8 sRGB, top row first, into its box, and the rest over it; None for no frame."""
+        """Draw a frame (H, W, 3) uint8 sRGB, top row first, into its box, and the rest over it; None for no frame.
+
+        bent : what a solved camera sees, drawn over the frame and below all marks.
+        """
         ctx = self.view.ctx
         ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         framebuffer.use()
@@ -54,6 +59,10 @@ class PlatePicture:
             sharp = (box[2] - box[0]) / pixels.shape[1] >= SHARP_FROM
             texture.filter = (moderngl.LINEAR, moderngl.NEAREST if sharp else moderngl.LINEAR)
             self.view.images.draw(texture, box, size)
+            if bent is not None:
+                if self._through is None:
+                    self._through = ThroughLens(ctx)
+                self._through.draw(bent, texture, box, size)
         self.view.draw_over(size, overlays, hud, ratio, axes=False)
         for inset, texture in zip(insets, self._inset_textures(insets), strict=True):
             self.view.images.draw(texture, inset.box, size)
@@ -90,8 +99,7 @@ class PlatePicture:
     def release(self) -> None:
         """Give back the memory; the context must be current."""
         things: list[Any] = [texture for _, texture in self._insets]
-        if self._texture is not None:
-            things.append(self._texture)
+        things += [thing for thing in (self._texture, self._through) if thing is not None]
         for thing in things:
             thing.release()
-        self._texture, self._pixels, self._insets = None, None, []
+        self._texture, self._pixels, self._insets, self._through = None, None, [], None

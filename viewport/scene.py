@@ -126,6 +126,8 @@ class Lights(NamedTuple):
 class Scene(NamedTuple):
     """Everything in one picture. `background` is display RGB 0 .. 1 at the top and at the bottom.
 
+    clear : nothing is behind; finished pictures then hold sRGB times what is covered, and that as their fourth number.
+
     feathers : of finished pictures. quick_feathers : the same with fewer triangles, of moving ones.
     """
 
@@ -137,6 +139,7 @@ class Scene(NamedTuple):
     exposure: float = 1.0
     feathers: tuple[FeatherMesh, ...] = ()
     quick_feathers: tuple[FeatherMesh, ...] = ()
+    clear: bool = False
 
 
 def thinned(coat: Coat, most: int) -> Coat:

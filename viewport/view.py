@@ -38,6 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.camera import Camera
+from core.navigate import with_clipping
 from core.overlay import Overlay
 from core.workspace import ViewOptions
 from viewport.context import collect
@@ -46,6 +47,7 @@ from viewport.hud import LINE, ScreenImages, TextImage, plain_text
 from viewport.kept import same
 from viewport.light_maps import LightMaps, alike
 from viewport.moving import Moving
+from viewport.outline import extent
 from viewport.overlay_drawing import TONES, Byte3, MarkDrawing, Words, axes_marks, labels, marks
 from viewport.pictures import Pictures, read_image
 from viewport.renderer import Prepared, Renderer, light_directions
@@ -213,6 +215,30 @@ class View3D:
         yield 1.0
         self.moving.keep(scene, self.camera, (self._targets[0], self._finished_number))
         yield 1.0
+
+    def clear_picture(
+        self, scene: Scene, camera: Camera, size: tuple[int, int], options: ViewOptions
+    ) -> Iterator[NDArray[np.uint8] | None]:
+        """Draw a finished picture with nothing behind it, in slices; the last item is (h, w, 4) uint8, top row first:
+        sRGB times what is covered, and that. What is shown stays."""
+        options = options.replace(grid=False, axes=False, hud=False, background=None)
+        scene = scene._replace(coats=scene.coats if options.hair else (), guides=(), clear=True)
+        low, high = extent(self.renderer.outline.of(scene))
+        corners = np.array([np.where([i & 1, i & 2, i & 4], high, low) for i in range(8)])
+        camera = with_clipping(camera, corners)
+        self._lit = None  # the maps of the light are drawn for another eye
+        self._version += 1
+        texture = self.ctx.texture(size, 4)
+        target = self.ctx.framebuffer([texture])
+        try:
+            for _ in self.renderer.steps(scene, camera, target, size, FINISHED_SAMPLES, options):
+                self.ctx.finish()
+                yield None
+            pixels = np.frombuffer(target.read(components=4, alignment=1), np.uint8).reshape(size[1], size[0], 4)
+        finally:
+            target.release()
+            texture.release()
+        yield np.ascontiguousarray(pixels[::-1])
 
     def present(
         self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], overlays: Sequence[Overlay] = (),

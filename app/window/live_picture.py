@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from core.camera import Camera
 from core.errors import UserError
@@ -121,6 +123,28 @@ class LivePicture:
         self._size, self._options = size, options
         self._take(change, camera, single=True)
         yield from self.view.refine()
+
+    def clear_picture(
+        self, frame: float, camera: Camera, size: tuple[int, int]
+    ) -> Iterator[NDArray[np.uint8] | float | None]:
+        """Draw the scene at a frame with nothing behind it, in slices; the last item is (h, w, 4) uint8.
+
+        None instead of it says that something is still made on another thread: ask again when it was adopted.
+        """
+        session, live = self.session, self.live
+        options = shown_options(session)
+        change = live.update(session.document, frame, options, False, None, session.workspace.groom)
+        self._ask()
+        if self._jobs:
+            yield None
+            return
+        while (more := live.catch_up(CATCH_UP)) is not None:
+            for points, rows in more.rows:
+                self.view.rows_changed(points, rows)
+            change = more
+            yield 0.0
+        for part in self.view.clear_picture(change.scene, camera, size, options):
+            yield 0.5 if part is None else part
 
     def release(self) -> None:
         """Give everything on the graphics card back."""

@@ -49,6 +49,8 @@ from core.gate import gate_box, seen_through
 from core.overlay import Overlays
 from core.workspace import Workspace
 from tools.ground import Pointer, Sight
+from tools.match_edits import shown_plate
+from tools.solve_edits import solved_of
 from viewport.gate import gate_marks
 from viewport.panes import corner_of, pane_at, size_of
 from viewport.scene import Scene
@@ -85,6 +87,7 @@ class Viewport(QOpenGLWindow):
         self.views.fresh.connect(self.redraw)
         self._pane = 0  # the one the pointer is in
         self.plate = PlateView(desk, self.pixels, window)
+        self.plate.doors.draw_scene = self.draw_over_plate
         self.plate.fresh.connect(self.redraw)
         self.eye = Eye(desk, self.pixels, self.devicePixelRatio, self.redraw, self.plate.eye)
         self.gestures = Gestures(desk, self.eye, hotkeys, commands, window)
@@ -188,6 +191,24 @@ class Viewport(QOpenGLWindow):
             target.release()
             texture.release()
             yield np.ascontiguousarray(pixels[::-1])
+        finally:
+            self._lent -= 1
+            self.redraw()
+
+    def draw_over_plate(self, frame: int) -> Iterator[object]:
+        """Draw what stands in the document as the solved camera sees it on a frame of the plate, as its files count, in
+        short slices; see :meth:`SceneOver.drawn`."""
+        picture, plate = self.picture, shown_plate(self.desk.document)
+        solved = None if plate is None else solved_of(self.desk.document, plate.id)
+        if picture is None or solved is None:
+            yield None
+            return
+        self._lent += 1
+        try:
+            self.makeCurrent()
+            for part in self.plate.scene.drawn(picture, solved, frame):
+                yield part
+                self.makeCurrent()
         finally:
             self._lent -= 1
             self.redraw()
@@ -325,6 +346,8 @@ class Viewport(QOpenGLWindow):
         if self.plate.shown:
             if self.plate.settled:
                 self.settled.emit()
+            elif self.plate.scene.wanted and not self._rest.isActive() and not self._busy():
+                self._rest.start(CALM_MS)
             return
         if self.picture is not None and not self.picture.settled and not self._rest.isActive() and not self._busy():
             self._rest.start(CALM_MS)
@@ -335,7 +358,14 @@ class Viewport(QOpenGLWindow):
     def _rest_a_little(self) -> None:
         """One slice of finishing; the next comes after whatever events there are."""
         picture = self.picture
-        if picture is None or self._lent or self._busy() or self._stale or self.plate.shown or not self.isExposed():
+        if picture is None or self._lent or self._busy() or self._stale or not self.isExposed():
+            return
+        if self.plate.shown:
+            self.makeCurrent()
+            if self.plate.scene.rest(picture):
+                self._rest.start(0)
+            if not self.plate.scene.wanted:
+                self.repaint_soon()
             return
         prepare = self.desk.session.hand.preparation()
         if prepare is not None:  # so that the next press need not wait for it

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from app.movie import write_movie
 from app.window.jobs import Cancelled
 from app.window.match.marks import Sheet
+from app.window.match.scene_over import Drawn
 from app.window.match.solve_marks import solve_marks
 from core.formats.frame_decoder import FrameDecoder
 from core.formats.plate_file import PlateFrames
 from core.image.plate import Plate
 from core.image.plate_view import plate_camera, plate_size
 from core.match.solved import SolvedCamera, row_of_frame
+from core.match.through import over_plate
 from core.overlay import Overlays, Polyline
 from viewport.overlay_drawing import TONES
 from viewport.plate_color import PlateColors
@@ -28,12 +30,13 @@ DARK, LETTERS = (12, 12, 14), (228, 230, 233)
 
 def write_check_movie(
     path: Path, plate: Plate, solved: SolvedCamera, fps: float, root: Path | None,
-    progress: Callable[[float], None],
+    progress: Callable[[float], None], scene: Callable[[int], Drawn | None] | None = None, opacity: float = 1.0,
 ) -> int:
     """Write the solved frames of a plate with what the solve puts over them; returns how many.
 
     Parameters
     ----------
+    scene, opacity : draws what stands in the document as the camera of a frame sees it, and how much of it is shown.
     root : folder the plate's path is told from, or None. progress : share of the frames that is done; when it raises
         Cancelled, what was drawn by then becomes a shorter movie.
     """
@@ -45,6 +48,9 @@ def write_check_movie(
         pixels = source.get(int(frame))
         wide, tall = plate_size(plate)
         shown = np.zeros((tall, wide, 3), np.uint8) if pixels is None else colors.display(pixels, plate.color_space)
+        drawn = None if scene is None else scene(int(frame))
+        if drawn is not None:
+            shown = over_plate(shown, drawn.pixels, drawn.through, opacity)
         return marked(shown, plate, solved, int(frame))
 
     try:

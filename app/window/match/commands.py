@@ -163,6 +163,11 @@ def _ask_distance(window: Window) -> None:
              lambda words: window.desk.attempt(measured, words))
 
 
+def _scene_over(window: Window, opacity: float) -> None:
+    view = window.desk.workspace.view
+    window.desk.set_workspace(view=view.replace(over_plate=0.0 if view.over_plate == opacity else opacity))
+
+
 def _command(
     name: str, label: str, tooltip: str, run: Callable[[Window], object], twin: str, undo: str | None = None,
     enabled: Callable[[Desk], str | None] = needs_track, words: str = "", icon: str | None = None,
@@ -203,6 +208,14 @@ MATCH: tuple[Command, ...] = (
     _command("cube", "Cube at track", "Stands a test cube on the point of the track, or takes it away.",
              lambda w: w.desk.edit("Test cube", turn_cube, chosen(w.desk)[-1]), "tools.solve_edits.turn_cube",
              "Test cube", needs_solve, "test object box insert"),
+    _command("scene", "Scene over the plate",
+             "Shows the document's meshes, hair and feathers through the solved camera, lens and all; again hides them.",
+             lambda w: _scene_over(w, 1.0), "core.match.through.through_lens", enabled=needs_solved_plate,
+             words="overlay coat feathers model camera composite see through"),
+    _command("half_scene", "Half see-through scene",
+             "Shows the document's meshes, hair and feathers over the plate at half their opacity; again hides them.",
+             lambda w: _scene_over(w, 0.5), "core.match.through.through_lens", enabled=needs_solved_plate,
+             words="overlay transparent opacity composite"),
     _command("origin", "Origin at track", "Puts the origin of the solved world at the point of the active track.",
              lambda w: w.desk.edit("Set origin", line_up_edits.set_origin, chosen(w.desk)[-1]),
              "tools.line_up_edits.set_origin", "Set origin", needs_solve, "line up coordinate system zero"),

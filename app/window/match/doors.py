@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from app.movie import MOVIE_SUFFIXES
 from app.window.desk import Desk
 from app.window.files.opening import choose_file, filter_of
 from app.window.jobs import Asked, Cancelled, Job, Progress
+from app.window.match.scene_over import Drawn
 from core.errors import UserError
 from core.formats.atomic import atomic_write
 from core.formats.frame_decoder import FrameDecoder
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 Work = Callable[[Progress, Asked], Any]
 CAMERAS = (".usda", ".usdc", ".abc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
+WAIT = 0.05  # s before a scene that is still being made is asked for again
 
 
 class MatchDoors(QObject):
@@ -41,6 +44,7 @@ class MatchDoors(QObject):
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(desk)
         self._desk, self._parent = desk, parent
+        self.draw_scene: Callable[[int], object] | None = None  # of the view, where there is one
         self._writing: Job | None = None
         self._waiting: list[tuple[str, Work, Callable[[Any], None]]] = []
 
@@ -161,10 +165,20 @@ class MatchDoors(QObject):
 
         plate, solved, fps, saved = self._plate(), self._solved(), self._desk.document.fps, self._desk.session.path
         root = None if saved is None else saved.parent
+        document, opacity = self._desk.document, self._desk.workspace.view.over_plate
+        scene = self._scene_at if self.draw_scene is not None and document.meshes and opacity else None
         self._write(
             f"Write {path.name}",
-            lambda progress, cancelled: write_check_movie(path, plate, solved, fps, root, progress),
+            lambda progress, cancelled: write_check_movie(path, plate, solved, fps, root, progress, scene, opacity),
             lambda count: self._desk.said.emit(f"{count} frames of the plate with the solve are in {path.name}."))
+
+    def _scene_at(self, frame: int) -> Drawn | None:
+        """What stands in the document on a frame, drawn on the thread of the window; called by a job, which waits."""
+        while True:
+            found = self._desk.jobs.on_window(self.draw_scene, frame)
+            if found is None or isinstance(found, Drawn):
+                return found
+            time.sleep(WAIT)  # hair or feathers are still being made
 
     def ask_lens_maps(self) -> None:
         """Let the artist name the STMaps of the solved lens."""

@@ -17,6 +17,7 @@ from app.window.match.marks import Sheet, marks_of
 from app.window.match.model_job import ModelJob
 from app.window.match.model_marks import model_marks
 from app.window.match.pattern import patches
+from app.window.match.scene_over import SceneOver
 from app.window.match.screen import PlateScreen, Shown
 from app.window.match.solve_job import SolveJob
 from app.window.match.solve_marks import solve_marks
@@ -51,6 +52,7 @@ class PlateView(QObject):
         self.solving = SolveJob(desk)
         self.model = ModelJob(desk, window)
         self.doors = MatchDoors(desk, window)
+        self.scene = SceneOver(desk)
         self.screen.fresh.connect(self.fresh)
         self.tracking.made.connect(self.fresh)
         self._picture: PlatePicture | None = None
@@ -64,7 +66,7 @@ class PlateView(QObject):
     @property
     def settled(self) -> bool:
         """True when the frame of the desk is on the screen."""
-        return not self.screen.waiting
+        return not (self.screen.waiting or self.scene.wanted)
 
     def paint(
         self, view: View3D, framebuffer: moderngl.Framebuffer, size: tuple[int, int], over: Overlays,
@@ -87,9 +89,11 @@ class PlateView(QObject):
         small = patches(self.desk.document, self.screen, sheet, pointer)
         marks += small.marks
         words = self._words(shown, frame)
+        here = shown is not None and shown.frame == frame
         self._picture.present(
             framebuffer, size, None if shown is None else shown.pixels, box,
-            (*ground_of(words, ratio), *marks, *over), words, ratio, small.insets)
+            (*ground_of(words, ratio), *marks, *over), words, ratio, small.insets,
+            self.scene.over(plate, sheet) if here else None)
 
     def release(self) -> None:
         """Give back what is on the graphics card, its context current."""
