@@ -209,7 +209,7 @@ MATCH: tuple[Command, ...] = (
              lambda w: w.desk.edit("Test cube", turn_cube, chosen(w.desk)[-1]), "tools.solve_edits.turn_cube",
              "Test cube", needs_solve, "test object box insert"),
     _command("scene", "Scene over the plate",
-             "Shows meshes, hair and feathers of the document through the solved camera and its lens; again hides them.",
+             "Shows meshes, hair and feathers of the document through the solved camera and lens; again hides them.",
              lambda w: _scene_over(w, 1.0), "core.match.through.through_lens", enabled=needs_solved_plate,
              words="overlay coat feathers model camera composite see through"),
     _command("half_scene", "Half see-through scene",
