@@ -109,8 +109,9 @@ def _pieces(a: Floats, barbs: Barbs, curves: BarbCurves) -> tuple[list[NDArray[n
         rows = np.flatnonzero(curves.sides == side)
         apart = SPLIT + 2.1 * float(a[ANGLE_NOISE + side])
         step = np.linalg.norm(np.diff(curves.points[rows].astype(np.float64), axis=0), axis=2)
-        bare = (step * (1.0 - np.minimum(_closed(a, curves)[rows[:-1]], 1.0))).max(axis=1) > BARE * a[LENGTH]
-        breaks = np.flatnonzero((np.abs(np.diff(stray[rows])) > apart) | bare) + 1
+        widest = 2.0 * np.median(step, axis=0) if len(step) else 0.0
+        bare = step - np.minimum(_closed(a, curves)[rows[:-1]], 1.0) * np.minimum(step, widest)
+        breaks = np.flatnonzero((np.abs(np.diff(stray[rows])) > apart) | (bare.max(axis=1) > BARE * a[LENGTH])) + 1
         for piece in np.split(rows, breaks):
             if len(piece) == 1:
                 alone.append(piece)
