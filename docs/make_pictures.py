@@ -11,7 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.commands.demo import draw_poses
+from app.commands.demo import BIRD_FRAMES, draw_poses, write_bird
 from app.deliver import draw
 from app.drawing import draw_file
 from core.demo.arm import arm
@@ -37,6 +37,7 @@ PENGUIN = CAT.parents[1] / "penguin/penguin.obj"
 TUM = Path("matchmove/rgbd_tum_slambook_A/ch5/rgbd/color")  # slambook (Xiang Gao, MIT), after TUM
 # the chapter made of its steps stands between
 FIRST_POSE = "<!-- first pose -->\n", "\n<!-- end of first pose -->"
+FIRST_BIRD = "<!-- first bird -->\n", "\n<!-- end of first bird -->"
 FIRST_TRACK = "<!-- first track -->\n", "\n<!-- end of first track -->"
 FIRST_SOLVE = "<!-- first solve -->\n", "\n<!-- end of first solve -->"
 FIRST_PHOTOMODEL = "<!-- first photomodel -->\n", "\n<!-- end of first photomodel -->"
@@ -72,6 +73,20 @@ def first_pose() -> None:
 
     pictures_of_steps(STEPS, SIZE, picture_of)
     _put_chapter("pose.md", FIRST_POSE, chapter())
+
+
+def first_bird() -> None:
+    """Dress the demo's bird by hand; a picture of the window after every step, and the bird at three frames."""
+    ensure_display()  # before anything of Qt is made
+    from docs.first_bird import SIZE, STEPS, chapter, picture_of
+
+    pictures_of_steps(STEPS, SIZE, picture_of)
+    _put_chapter("feather.md", FIRST_BIRD, chapter())
+    with tempfile.TemporaryDirectory() as folder:
+        write_bird(Path(folder), as_json=True)
+        made = [cv2.imread(f"{folder}/bird-{frame}.png") for frame in BIRD_FRAMES]
+    small = [cv2.resize(picture, (900, 600), interpolation=cv2.INTER_AREA) for picture in made]
+    cv2.imwrite(str(PICTURES / "goldfinch.jpg"), cv2.hconcat(small), [cv2.IMWRITE_JPEG_QUALITY, 84])
 
 
 def first_track() -> None:
@@ -212,6 +227,7 @@ def main() -> None:
     feathers()
     first_groom()
     first_pose()
+    first_bird()
     first_solve()
     first_photomodel()
     shot()

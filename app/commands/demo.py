@@ -26,7 +26,8 @@ from core.groom.grow import grow
 from core.mesh.skin import Skin
 
 POSE_FRAMES = (1001, 1017, 1045, 1065)
-BIRD_FRAMES = (1001, 1014, 1022)
+# frames of the bird, and where they are looked at from
+BIRD_FRAMES = {1001: (-0.75, -0.2, -0.6), 1014: (-0.9, -0.35, 0.1), 1022: (-0.35, -0.5, 0.8)}
 
 
 def command(
@@ -46,7 +47,7 @@ def command(
     if what == "match":
         _match(folder, as_json)
     elif what == "bird":
-        _bird(folder, as_json)
+        write_bird(folder, as_json)
     elif what == "pose":
         _pose(folder, as_json)
     else:
@@ -74,25 +75,26 @@ def _animal(folder: Path, mesh: Path | None, hairs: int, as_json: bool) -> None:
     report.done({"outputs": outputs, "seconds": report.seconds}, ["the demo animal has its coat:", *outputs])
 
 
-def _bird(folder: Path, as_json: bool) -> None:
+def write_bird(folder: Path, as_json: bool) -> None:
+    """The finch in its feathers, and bare, as projects; pictures of it folded, opening and open."""
     from core.demo.bird_document import bare_bird_document, bird_document
 
     report, evaluator = Report(as_json), Evaluator()
     bare, dressed = folder / "bare-bird.filo", folder / "bird.filo"
-    pictures = [(folder / f"bird-{frame}.png", frame) for frame in BIRD_FRAMES]
+    pictures = [(folder / f"bird-{frame}.png", frame, view) for frame, view in BIRD_FRAMES.items()]
     with report.working(total=4 + len(pictures)):
         document = bird_document(evaluator, stage=report.stage)
         with report.stage("export_filo", f"writing {dressed}"):
             write_project(bare, bare_bird_document())
             write_project(dressed, document)
-        for path, frame in pictures:
+        for path, frame, view in pictures:
             with report.stage("export_picture", f"drawing {path.name}"):
                 skins = posed_document(document, float(frame), evaluator)
                 feathers = feather_meshes(document, skins, float(frame), evaluator)
-                points = np.concatenate([mesh.points for mesh in feathers])
-                camera = frame_points(points, (-0.75, -0.3, -0.6), 1.5)
+                points = np.concatenate([skins[1].points, *(mesh.points for mesh in feathers)])
+                camera = frame_points(points, view, 1.5)
                 draw(path, document, {}, evaluator, (1500, 1000), skins=skins, camera=camera, feathers=feathers)
-    outputs = [str(bare), str(dressed), *(str(path) for path, _ in pictures)]
+    outputs = [str(bare), str(dressed), *(str(path) for path, _, _ in pictures)]
     report.done(
         {"outputs": outputs, "seconds": report.seconds},
         ["a finch in its feathers, and the same one bare:", *outputs, f"the window opens it: filoplume {dressed}"])

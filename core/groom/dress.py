@@ -82,7 +82,7 @@ def dress(
     return Groom(id=1, name=name, mesh_id=mesh_id, guides=laid, coat=coat, maps=maps)
 
 
-def skin_flow(skin: Skin) -> Flow:
-    """The direction a coat lies in on this skin (see ``core.groom.flow``), frozen."""
-    flow = flow_field(skin.points, skin.triangles.vertices, skin.normals)
+def skin_flow(skin: Skin, nose: int | None = None) -> Flow:
+    """The direction a coat lies in on this skin (see ``core.groom.flow``), frozen; from a known nose, or one found."""
+    flow = flow_field(skin.points, skin.triangles.vertices, skin.normals, nose=nose)
     return Flow(freeze(flow.directions), freeze(flow.distance), flow.nose)

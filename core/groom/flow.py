@@ -27,19 +27,21 @@ class Flow(NamedTuple):
     nose: int
 
 
-def flow_field(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray, gravity: float = 0.35) -> Flow:
+def flow_field(
+    points: np.ndarray, triangles: np.ndarray, normals: np.ndarray, gravity: float = 0.35, nose: int | None = None
+) -> Flow:
     """Directions a coat lies in, for every vertex.
 
     Parameters
     ----------
     points : (V, 3) float, metres, Y up. triangles : (T, 3) int. normals : (V, 3) unit, outward.
-    gravity : weight of straight down against away-from-the-nose.
+    gravity : weight of straight down against away-from-the-nose. nose : the vertex where that is known.
     """
     p = np.asarray(points, np.float64)
     n = np.asarray(normals, np.float64)
     edges = _edges(triangles)
     average = _averaging(len(p), edges)
-    nose = nose_vertex(p, triangles)
+    nose = nose_vertex(p, triangles) if nose is None else nose
     raw = np.tile([0.0, -gravity, 0.0], (len(p), 1))
     distance = np.full(len(p), np.inf)
     if nose >= 0:

@@ -28,7 +28,7 @@ from core.pose.rig import Rig
 from core.record import freeze
 
 KEYS, POINTS = 120, 8
-FACE, SMALL = (0.1, 0.28), 0.42  # shares of the way over the body from the nose; of the length at the nose
+FACE, SMALL = (0.1, 0.3), 0.68  # shares of the way over the body from the nose; of the length at the nose
 OVERLAP, WINGED_OVERLAP = 3.7, 5.5  # rows that a feather covers; more where a bird is to be seen from near
 LIFT = 0.28  # radians, of a key off the skin
 
@@ -61,8 +61,10 @@ def dress_feathers(
     areas = face_areas(skin.points, skin.triangles.vertices)
     if not areas.sum() > 0.0:
         raise UserError("the mesh has no surface to grow feathers on")
-    flow = skin_flow(skin)
     wings = dress_wings(mesh, rig) if rig is not None and find_wings(mesh, rig) else ()
+    # the beak lies farthest from where the innermost quills point
+    nose = int(np.argmin(skin.points @ np.array(wings[0].inner_direction))) if wings else None
+    flow = skin_flow(skin, nose)
     if overlap is None:
         overlap = WINGED_OVERLAP if wings else OVERLAP
     face = _face(flow) if wings else np.zeros(len(skin.points))

@@ -18,6 +18,7 @@ ROWS, COLUMNS = 19, 9  # of a vane as it is drawn: enough for bars and for the c
 VARIANTS = 16  # of the colours of one preset; neighbours by id never have the same
 STREAKS = 0.3  # by which barbs differ in brightness
 LOOSE = 0.45  # of the way from shaft to edge, and of the length at the tip: where barbs begin to come loose
+ROUND = 0.45  # of a normal at the edge of a firm vane, outward
 FIRM, FIRM_LOOSE = ("remex", "rectrix"), 0.93  # kinds of feathers that are closed almost to their edges
 
 
@@ -73,10 +74,12 @@ def _alike(
     along = np.gradient(grid, axis=1)
     normals = np.cross(np.gradient(grid, axis=2), along)
     normals *= np.sign(np.einsum("nabx,nx->nab", normals, laid.feathers.frames[rows][:, 2]))[..., None]
+    share = np.abs(np.linspace(-1.0, 1.0, wide))
+    if loose == FIRM_LOOSE:  # a quill lies flat in the wing, and still takes the light as a vane that is a little round
+        normals = unit(normals) + ROUND * share[:, None] * unit(outward)
     count, vertices = len(rows), down * wide
     side = np.repeat((np.arange(wide) >= wide // 2)[None], down, axis=0).astype(np.intp).reshape(-1)
     place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(own[:, wide // 2], axis=0), axis=1))])
-    share = np.abs(np.linspace(-1.0, 1.0, wide))
     places = np.stack(np.meshgrid(place / place[-1], share, indexing="ij"), axis=-1).reshape(vertices, 2)
     barbs = np.repeat(np.arange(down), wide)
     chance = rand(np.arange(count)[:, None] * down + barbs, seed + 90)

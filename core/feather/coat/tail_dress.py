@@ -21,9 +21,10 @@ PATCH = 48  # vertices of an anchor at most
 STIFF = 0.9  # share of its joint that a vertex of an anchor needs at least, where enough have it
 FEATHERS, HALF_FAN = 12, np.radians(13.0)
 STEP = 0.0014  # of the arm of the wing, from a feather up to the next
-# how far before the end of the stub, length, feathers, height: of the arm but for the number
-COVERTS = ((0.08, 0.36, 9, 0.004), (0.16, 0.32, 10, 0.008), (0.24, 0.28, 11, 0.012), (0.32, 0.25, 11, 0.016))
-AROUND = np.radians(70.0)  # to either side of the top
+# how far before the end of the stub, length, feathers, height (of the arm), and degrees to either side of the top
+COVERTS = (
+    (0.08, 0.36, 7, 0.004, 38.0), (0.16, 0.32, 8, 0.008, 48.0), (0.24, 0.28, 10, 0.012, 60.0),
+    (0.32, 0.25, 11, 0.016, 70.0))
 SLAB = 0.05  # of the arm, half of the stretch over which the stub is measured
 
 
@@ -73,31 +74,32 @@ def dress_tail(mesh: Mesh, rig: Rig, size: float, number: int) -> Wing | None:
         0, "tail feathers", "tail", FEATHERS, line, np.tile(normal, (3, 1)), np.array([1.0, 0.9, 1.0]) * size,
         np.array([0.9, 1.0, 0.9]), 0.0, STEP * size)]
     for side, name in ((1.0, "tail coverts"), (-1.0, "under tail coverts")):
-        for before, length, count, height in COVERTS:
-            places, normals = _around(points, tip, back, across, side * normal, before * size, size)
+        for before, length, count, height, around in COVERTS:
+            places, normals, radius = _around(points, tip, back, across, side * normal, before * size, size, around)
             ones = np.ones(len(places))
             rows.append(_row(
                 len(rows), f"{name} {len(rows)}", name, count, places, normals, length * size * ones, 1.2 * ones,
-                height * size - 0.01 * size, 0.5 * STEP * size))
+                height * size - 0.01 * size, 0.5 * STEP * size, 1.0 / (radius + height * size)))
     ends = [normalized(np.cos(HALF_FAN) * back + s * np.sin(HALF_FAN) * across) for s in (-1.0, 1.0)]
     return Wing(
-        id=number, name=f"tail of {rig.skeleton.names[joint]}", kind="tail", rows=tuple(rows), inner=0, outer=0,
+        id=number, name="tail", kind="tail", rows=tuple(rows), inner=0, outer=0,
         anchors=(anchor_of(mesh, rig, joint, tip),), inner_direction=as_triple(ends[0]),
         outer_direction=as_triple(ends[1]), middle=0.5)
 
 
 def _around(
-    points: Array, tip: Array, back: Array, across: Array, normal: Array, before: float, size: float
-) -> tuple[Array, Array]:
-    """Places and normals (5, 3) over one side of the stub, measured on its points."""
+    points: Array, tip: Array, back: Array, across: Array, normal: Array, before: float, size: float,
+    around: float,
+) -> tuple[Array, Array, float]:
+    """Places and normals (5, 3) over one side of the stub, measured on its points, and how far they are around."""
     wide, high = _girth(points, tip, back, across, normal, before, size)
     _, behind = _girth(points, tip, back, across, normal, before - 2.0 * SLAB * size, size)
-    slope = np.clip((high - behind) / (2.0 * SLAB * size), 0.0, 0.12)  # it tapers, and the feathers with it
-    angles = np.linspace(-AROUND, AROUND, 5)
+    slope = np.clip((high - behind) / (2.0 * SLAB * size), 0.0, 0.05)  # it tapers, and the feathers with it
+    angles = np.radians(np.linspace(-around, around, 5))
     sides, tops = np.sin(angles)[:, None] * across, np.cos(angles)[:, None] * normal
     places = tip - before * back + wide * sides + high * tops
     normals = sides + tops + slope * back
-    return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return places, normals / np.linalg.norm(normals, axis=1, keepdims=True), 0.5 * (wide + high)
 
 
 def _girth(
@@ -113,14 +115,14 @@ def _girth(
 
 def _row(
     number: int, name: str, part: str, count: int, places: Array, normals: Array, lengths: Array, widths: Array,
-    height: float, step: float,
+    height: float, step: float, cup: float = 0.0,
 ) -> WingRow:
     stations = len(places)
     return WingRow(
         id=number, name=name, part=part, count=count, anchors=freeze(np.zeros(stations, np.int32)),
         places=freeze(places.astype(np.float32)), normals=freeze(normals.astype(np.float32)),
         shares=freeze(np.linspace(0.0, 1.0, stations).astype(np.float32)), lengths=freeze(lengths.astype(np.float32)),
-        widths=freeze(widths.astype(np.float32)), height=height, step=step, top=0.5, bend=constant(0.0),
+        widths=freeze(widths.astype(np.float32)), height=height, step=step, top=0.5, cup=cup, bend=constant(0.0),
     )
 
 

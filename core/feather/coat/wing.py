@@ -76,6 +76,8 @@ class WingRow(Record):
     lengths : (S,) float32, metres. widths : (S,) float32, factors on the vanes.
     height : metres the row lies above its line. step : metres from a feather up to the next that lies over it.
     top : where in the row, 0 .. 1, lies the feather that lies over all others.
+    roll : radians every feather of the row is rolled while it is open, its leading edge up, like tiles.
+    cup : 1 / metre, how far vanes are bent across, so that a row lies around what it stands on.
     follow : how far the row follows the fan; 0 stays with the skin as at rest, 1 goes with the quills.
     """
 
@@ -91,6 +93,8 @@ class WingRow(Record):
     height: float = 0.0
     step: float = 1e-4
     top: float = 0.0
+    roll: float = 0.0
+    cup: float = 0.0
     count: Annotated[int, field(
         "Feathers", "How many feathers stand in this row, evenly from the body outward.",
         soft=(1, 24), hard=(0, MOST_FEATHERS), step=1,
@@ -129,6 +133,8 @@ class WingRow(Record):
         number(self, "count", least=0, most=MOST_FEATHERS)
         number(self, "follow", "top", least=0.0, most=1.0)
         number(self, "height", "step", least=-1e3, most=1e3)
+        number(self, "cup", least=-1e6, most=1e6)
+        number(self, "roll", least=-1.5, most=1.5)
         column(self, "anchors", np.int32, (None,))
         stations = len(self.anchors)
         column(self, "places", np.float32, (stations, 3))

@@ -30,6 +30,7 @@ BONES = {
 }
 
 RISING = 0.16  # by which the innermost feathers point up from the wing, so that they lie on the back when it folds
+TILED = 0.08  # radians quills are rolled, so that neighbours lie over one another like tiles
 DROP = 0.012  # of the arm, from one bone to the next, by which feathers outward lie lower than those they stand beside
 FOLDED_AWAY = "0.3 + 0.7 * clamp(open, 0, 1)"  # of their length is left of feathers below a folded wing
 
@@ -70,11 +71,11 @@ ROWS = (
     Plan("median coverts", "median coverts", 15, -0.15, 2.1, 0.022, (0.0, 0.12, 0.42), (0.24, 0.26, 0.24), (1.5, 1.4),
          0.02, 0.85),
     Plan("lesser coverts, lower", "lesser coverts", 18, -0.25, 2.35, 0.034, (0.0, 0.15, 0.55), (0.19, 0.19, 0.16),
-         (1.5, 1.5), 0.026, 0.75, 1.0, -2.0),
+         (1.5, 1.5), 0.026, 0.75, 0.0, -1.0),
     Plan("lesser coverts, upper", "lesser coverts", 20, -0.35, 2.6, 0.044, (0.0, 0.15, 0.6), (0.16, 0.16, 0.13),
-         (1.6, 1.5), 0.026, 0.7, 5.0, -6.0),
+         (1.6, 1.5), 0.031, 0.7, 1.0, -2.0),
     Plan("marginal coverts", "lesser coverts", 24, -0.45, 2.95, 0.052, (0.0, 0.2, 0.75), (0.13, 0.13, 0.1), (1.6, 1.5),
-         0.012, 0.6, 16.0, -18.0),
+         0.034, 0.6, 1.0, -4.0),
     Plan("greater under coverts", "under coverts", 19, 0.3, 2.9, 0.01, (0.0, 0.25, 1.0), (0.34, 0.36, 0.24), (1.3, 1.2),
          0.02, 0.95, below=True),
     Plan("lesser under coverts", "under coverts", 22, 0.1, 2.8, 0.04, (0.0, 0.2, 0.9), (0.2, 0.2, 0.14), (1.6, 1.5),
@@ -157,9 +158,10 @@ def _wing(mesh: Mesh, rig: Rig, bones: WingBones, number: int) -> Wing:
     outer = normalized(end + 0.12 * back)
     body_way = normalized(places[0] - places[1])
     rows = tuple(_row(k, row, places, size, normal, back, body_way) for k, row in enumerate(ROWS))
-    name = rig.skeleton.names[arm]
+    side = "left" if float(places[:, 0].mean()) > 0.0 else "right"  # animals look along +z
     return Wing(
-        id=number, name=f"wing of {name}", kind="wing", anchors=anchors, rows=rows, inner=0, outer=3,
+        id=number, name=f"{side} wing" if number < 2 else f"{side} wing {number + 1}", kind="wing",
+        anchors=anchors, rows=rows, inner=0, outer=3,
         inner_direction=as_triple(back + RISING * normal), outer_direction=as_triple(outer))
 
 
@@ -203,6 +205,7 @@ def _row(number: int, plan: Plan, places: Array, size: float, normal: Array, bac
         shares=freeze(shares.astype(np.float32)), lengths=freeze((lengths * size).astype(np.float32)),
         widths=freeze(widths.astype(np.float32)), height=(plan.height + DROP * (3.0 - begin)) * size,
         step=DROP * (end - begin) / (plan.many - 1) * size, follow=plan.follow,
+        roll=TILED if plan.follow == 1.0 else 0.0,
         length=formula(FOLDED_AWAY) if plan.below else constant(1.0),
         lift=constant(float(np.radians(plan.lift))), bend=constant(float(np.radians(plan.bend))),
     )

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from core.evaluator import Evaluator
 from core.feather.coat.frames import unit
 from core.feather.coat.posing import LENGTH
-from core.feather.coat.wing import Wing
+from core.feather.coat.wing import WING_IDS, Wing
 from core.feather.coat.wing_pose import lay_wings
 from core.mesh.bvh import closest_points
 from core.mesh.mesh import Mesh
@@ -20,7 +20,7 @@ from core.mesh.skin import Skin
 from core.mesh.surface import place_roots
 
 CLEAR = 0.8  # of their length, around keys beside a wing, in which no others stand
-INNERMOST = 4  # feathers of a row that keys stand beside
+INNERMOST = 4  # feathers of a row of a wing that keys stand beside; every second one of a tail
 COVERTS = "covert"  # rows whose parts are called so lie on the skin
 
 
@@ -33,12 +33,13 @@ class Beside(NamedTuple):
 
 
 def keys_beside(wings: tuple[Wing, ...], mesh: Mesh, skin: Skin, evaluator: Evaluator) -> Beside:
-    """Keys on the skin below the innermost feathers of all rows of coverts that begin on the body, lying as they do."""
+    """Keys on the skin below feathers of the rows of coverts that begin on the body, lying as they do."""
     chosen = tuple(
         wing.replace(rows=tuple(row for row in wing.rows if COVERTS in row.part and row.anchors[0] == 0))
         for wing in wings)
     laid = lay_wings(chosen, mesh.points, mesh.points, 0.0)
-    first = np.isin(laid.ids & 255, np.arange(INNERMOST))
+    tails = np.isin((laid.ids - WING_IDS) >> 16, [wing.id for wing in wings if wing.kind == "tail"])
+    first = np.where(tails, laid.ids % 2 == 0, (laid.ids & 255) < INNERMOST)
     triangle, weights, _ = closest_points(skin.bvh, laid.roots[first], workers=evaluator.workers)
     found = triangle >= 0
     roots = place_roots(mesh, skin.triangles, triangle[found], weights[found].astype(np.float32), skin.normals)

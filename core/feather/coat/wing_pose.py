@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from core.curve import Curve
 from core.feather.coat.frames import frames_of, unit
-from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL, TWIST
+from core.feather.coat.posing import BEND, CUP, LENGTH, LIFT, POSE, ROLL
 from core.feather.coat.wing import (
     OFFSET_FIELDS,
     OFFSET_VALUES,
@@ -26,7 +26,6 @@ from core.random import rand
 from core.value import Formula, Value, evaluate_within, names_used
 
 Array = NDArray[np.float64]
-ROLLED = 0.08  # radians every feather is rolled, its leading edge up, so that neighbours lie like tiles
 VARIED = 0.012, 0.02  # radians of direction and share of the length, by which feathers of a row differ
 
 
@@ -51,11 +50,12 @@ def lay_wings(
 ) -> WingFeathers:
     """The feathers of wings on a skin whose points are (V, 3) at rest and posed, metres."""
     rows: list[tuple[Any, ...]] = []
-    for wing in sorted(wings, key=lambda one: one.id):
+    for wing in sorted((one for one in wings if one.rows), key=lambda one: one.id):
         moves = [anchor_move(anchor, rest, posed) for anchor in wing.anchors]
+        upper = _upper(wing, moves)
         for row in sorted(wing.rows, key=lambda one: one.id):
             if row.count:
-                rows.append(_lay_row(wing, row, moves, frame))
+                rows.append(_lay_row(wing, row, moves, frame, upper))
     if not rows:
         none = np.zeros((0, 3), np.float32)
         return WingFeathers(
@@ -81,7 +81,19 @@ def anchor_move(anchor: Anchor, rest: NDArray[np.float32], posed: NDArray[np.flo
     return turn, to - turn @ at
 
 
-def _lay_row(wing: Wing, row: WingRow, moves: list[tuple[Array, Array]], frame: float) -> tuple[Any, ...]:
+def _upper(wing: Wing, moves: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Where the upper side of a wing faces, (3,) at rest and now: the mean of the row that was made first."""
+    first = min(wing.rows, key=lambda row: row.id)
+    at_rest = first.normals.astype(np.float64)
+    quills = [row for row in wing.rows if row.normals[0] @ first.normals[0] > 0.0 and row.follow == 1.0] or [first]
+    now = [moves[a][0] @ normal.astype(np.float64) for row in quills for a, normal in zip(
+        row.anchors, row.normals, strict=True)]
+    return unit(at_rest.mean(axis=0)), unit(np.mean(now, axis=0))
+
+
+def _lay_row(
+    wing: Wing, row: WingRow, moves: list[tuple[Array, Array]], frame: float, upper: tuple[Array, Array]
+) -> tuple[Any, ...]:
     count = row.count
     k = np.linspace(0.0, 1.0, count) if count > 1 else np.full(1, 0.5)
     number = np.arange(1, count + 1)
@@ -97,6 +109,10 @@ def _lay_row(wing: Wing, row: WingRow, moves: list[tuple[Array, Array]], frame: 
     inner, outer = np.array(wing.inner_direction), np.array(wing.outer_direction)
     inner_now, outer_now = moves[wing.inner][0] @ inner, moves[wing.outer][0] @ outer
     opened = _opened(inner, outer, normals_at_rest, inner_now, outer_now, normals)
+    share_open = min(max(opened, 0.0), 1.0)
+    if wing.kind == "wing":  # folded feathers lie in one plane, so that none stands through another
+        over = 1.0 if normals_at_rest[0] @ upper[0] >= 0.0 else -1.0
+        normals = unit(share_open * normals + (1.0 - share_open) * over * upper[1])
     known = {"k": k, "number": number, "open": opened, "frame": frame}
     given = {name: evaluate_within(getattr(row, name), ROW_FIELDS[name], frame, known) for name in ROW_VALUES}
     added = {name: np.broadcast_to(given[name], count).astype(np.float64) for name in ROW_VALUES}
@@ -130,9 +146,9 @@ def _lay_row(wing: Wing, row: WingRow, moves: list[tuple[Array, Array]], frame: 
     poses = np.zeros((count, POSE))
     poses[:, LENGTH] = length
     poses[:, LIFT] = added["lift"]
-    poses[:, ROLL] = -side * (ROLLED * min(max(opened, 0.0), 1.0) + added["twist"])
+    poses[:, ROLL] = -side * (row.roll * share_open + added["twist"])
     poses[:, BEND] = -added["bend"] / length
-    poses[:, CUP] = poses[:, TWIST] = 0.0
+    poses[:, CUP] = row.cup
     return ids, roots, frames, poses, widths * added["width"], flipped, np.full(count, row.part)
 
 

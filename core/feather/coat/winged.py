@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.evaluator import Evaluator
-from core.feather.coat.base import own_curves
 from core.feather.coat.bed import Bed
 from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.crossing import vane_boxes
 from core.feather.coat.layering import Feathers, Layered, layer_around
-from core.feather.coat.posing import BEND, CUP, LENGTH, pose_vanes
+from core.feather.coat.posing import LENGTH, pose_vanes
 from core.feather.coat.wing_pose import WingFeathers, lay_wings
 from core.feather.coat.worn import parts_of, worn_preset, worn_values
 from core.feather.vane import SHAPE_COLUMNS, vane_grids
@@ -48,9 +47,6 @@ def winged(coat: FeatherCoat, mesh: Mesh, laid: Laid, frame: float, evaluator: E
     if not len(wings.ids):
         return laid
     own = wing_vanes(coat, wings, evaluator)
-    flat = own_curves(own) / wings.poses[:, LENGTH, None]  # what they curve by themselves would make them cross
-    wings.poses[:, CUP] -= flat[:, 0]
-    wings.poses[:, BEND] -= flat[:, 1]
     vanes = pose_vanes(own, wings.poses, wings.roots, wings.frames, ranges=evaluator.workers.ranges)
     before, rest = len(laid.ids), laid.feathers
     feathers = Feathers(
@@ -82,6 +78,7 @@ def wing_vanes(coat: FeatherCoat, wings: WingFeathers, evaluator: Evaluator) -> 
         table[:, SHAPE_COLUMNS[name]] *= wings.widths.astype(np.float32)
     own = vane_grids(table, ROWS, COLUMNS, evaluator.workers.ranges)
     own[wings.flipped, ..., 0] *= -1.0
+    own[..., 2] = 0.0  # feathers a tenth of a millimetre apart cross by what each curves by itself; rows bend as one
     return own
 
 

@@ -15,7 +15,7 @@ from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.layering import crossings
 from core.feather.coat.plumage import Plumage
-from core.feather.coat.posing import LENGTH
+from core.feather.coat.posing import LENGTH, ROLL
 from core.feather.coat.wing import WING_IDS, Anchor, Wing, WingOffset, WingRow, first_id
 from core.feather.coat.wing_dress import dress_wings
 from core.feather.coat.wing_pose import WingFeathers, anchor_move, lay_wings
@@ -112,7 +112,7 @@ def test_an_inner_feather_lies_over_the_next_outer_one(
     rows = _of(wings[0], _row(wings[0], "primaries"), laid)
     roots, up = laid.roots[rows].astype(float), laid.frames[rows, 2].astype(float)
     assert np.all(np.einsum("nc,nc->n", roots[:-1] - roots[1:], up[:-1]) > 0.0)
-    leading_up = laid.poses[rows, 1] * np.where(laid.flipped[rows], 1.0, -1.0)
+    leading_up = laid.poses[rows, ROLL] * np.where(laid.flipped[rows], 1.0, -1.0)
     assert np.all(leading_up > 0.0)
     assert laid.flipped[rows].all()
     assert not laid.flipped[_of(wings[1], _row(wings[1], "primaries"), laid)].any()
@@ -128,6 +128,9 @@ def test_coverts_follow_their_quills_as_far_as_they_are_told(bird: Bird, wings: 
         rest = _at(bird, changed, None)
         rows = _of(changed[0], _row(changed[0], "primary coverts"), laid)
         along, with_bone = laid.frames[rows, 1].astype(float), rest.frames[rows, 1].astype(float) @ stiff.T
+        up = laid.frames[rows, 2].astype(float)  # in the plane of the folded wing
+        with_bone -= up * np.einsum("nc,nc->n", with_bone, up)[:, None]
+        with_bone /= np.linalg.norm(with_bone, axis=1, keepdims=True)
         angles.append(np.degrees(np.arccos(np.clip(np.einsum("nc,nc->n", along, with_bone), -1.0, 1.0))).max())
     assert angles[0] < 0.2  # goes with the bone as if it were grown to it
     assert angles[0] < angles[1] < angles[2]
@@ -213,6 +216,20 @@ def test_feathers_of_the_skin_make_way_for_those_of_the_wing(dressed: tuple[Docu
         alone = document.feathers[0].replace(placements=(document.feathers[0].placements[0].replace(count=0),))
         only = _laid(document.replace(feathers=(alone,)), evaluator, frame)
         np.testing.assert_array_equal(laid.layered.vanes[wing], only.layered.vanes)  # they lie where they lie
+
+
+@pytest.mark.parametrize("frame", [FOLDED, HALF, OPEN])
+def test_quills_and_their_coverts_slide_over_one_another(dressed: tuple[Document, Evaluator], frame: float) -> None:
+    document, evaluator = dressed
+    coat = document.feathers[0]
+    parts = ("primaries", "secondaries", "tertials", "primary coverts", "greater coverts")
+    wings = tuple(wing.replace(rows=tuple(row for row in wing.rows if row.part in parts)) for wing in coat.wings[:2])
+    bare = coat.replace(wings=wings, placements=(coat.placements[0].replace(count=0),))
+    laid = _laid(document.replace(feathers=(bare,)), evaluator, frame)
+    left = crossings(laid.layered, laid.skin.bvh, evaluator.workers)
+    assert len(laid.ids) == 2 * (9 + 9 + 3 + 9 + 13)
+    assert left.pairs > 500  # so many lie close enough to cross
+    assert len(left.first) <= 0.05 * left.pairs
 
 
 def test_a_frame_reads_no_other(dressed: tuple[Document, Evaluator]) -> None:
