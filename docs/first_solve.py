@@ -17,8 +17,11 @@ from PySide6.QtWidgets import QPushButton
 from app.shot_plate import balls, box_faces, write_picture
 from app.window.match.solve_panel import SolvePanel
 from core.camera import Camera, look_at, project
+from core.demo.bird import demo_bird
+from core.formats.mesh_file import write_mesh
 from core.image.plate_view import view_points
 from core.match.solved_scene import points_up
+from core.record import freeze
 from docs.first_groom import Step
 from tests.window.hand import ALT, CTRL, LEFT, NONE, SHIFT, Hand
 from viewport.context import temporary_context
@@ -42,6 +45,7 @@ HIGHER = [
 MARKS = np.array([(x, 0.0, z) for x, z in TABLE] + HIGHER)
 GROUND, ACROSS, STANDS = (3, 1, 2), (1, 2), 3  # numbers of tracks, from 1 in the order of MARKS
 WIDTH = 0.96  # metres between the two of ACROSS
+TALL, BIRD_AT = 0.3, (0.27, 0.0, 0.12)  # metres
 
 
 def ball(row: int) -> NDArray[np.float64]:
@@ -171,6 +175,25 @@ def stands(hand: Hand, folder: Path) -> None:
     hand.rest()
 
 
+def stands_bird(hand: Hand, folder: Path) -> None:
+    """A bird of the project's own is brought in, and wears feathers."""
+    from app.window.feather_coats import dress_with_feathers
+
+    desk = hand.window.desk
+    mesh = demo_bird().mesh
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    points = (mesh.points - [0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])]) * (TALL / (high[1] - low[1]))
+    write_mesh(folder / "bird.obj", mesh.replace(points=freeze((points + BIRD_AT).astype(np.float32))))
+    hand.window.opening.import_mesh(folder / "bird.obj")
+    hand.until(lambda: bool(desk.document.meshes), 60_000)
+    hand.rest()
+    dress_with_feathers(desk, desk.document.meshes[-1], "goldfinch")
+    hand.until(lambda: bool(desk.document.feathers), 240_000)
+    hand.window.desk.set_craft("match")
+    desk.set_workspace(frame=float(FIRST + FRAMES // 2))
+    hand.finish()
+
+
 def gives(hand: Hand, folder: Path) -> None:
     doors = hand.window.match.doors
     for give, name in ((doors.export_camera, "table.usda"), (doors.write_check_movie, "table.mp4"),
@@ -215,6 +238,10 @@ STEPS = (
     Step("Stand a cube on the table",
          "Click a mark of the table and choose *Cube at track*. Scrub: the cube stays where it is.", stands,
          ("Select tracks", "Test cube")),
+    Step("Put the bird on the table",
+         "File, Import mesh brings in what is to stand there; here it is dressed with feathers (Ctrl+K). It is seen "
+         "through the solved camera, bent by its lens, on every frame: *Scene over the plate* and *Half see-through "
+         "scene* (Ctrl+K) hide it, and the movie has it too.", stands_bird, ("Import bird", "Dress with feathers")),
     Step("Give the camera away",
          "File, Export camera, `table.usda`; the suffix names the program. It has one camera with a sample for every "
          "frame, and the points. *Movie of the solve* writes the plate with all that stands over it, for others to "
