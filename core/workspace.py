@@ -11,6 +11,7 @@ from core.record import Record, number, text
 
 SHADINGS = ("shaded", "matcap", "wire", "lines")
 
+PROXIES = ("full", "half", "quarter")
 
 class Respect(Record):
     """What every tool heeds. Frozen guides are never edited, whatever stands here."""
@@ -85,6 +86,30 @@ class ViewOptions(Record):
         return self.wire or self.shading in ("wire", "lines")
 
 
+class PlateLook(Record):
+    """How frames of plates are shown; what tracking sees of them is the plate's own.
+
+    display : "Display / View" of the OpenColorIO configuration, or "" for its first.
+    """
+
+    proxy: Annotated[str, field(
+        "Proxy", "Shows frames at full size, or at a half or a quarter, which is read sooner; tracking sees all of it.",
+        choices=PROXIES)] = "full"
+    exposure: Annotated[float, field(
+        "Exposure", "Shows plates brighter or darker by so many stops; nothing that is tracked or written changes.", "",
+        (-6.0, 6.0), (-20.0, 20.0), 0.5)] = 0.0
+    gamma: Annotated[float, field(
+        "Gamma", "Lifts what is dark on the screen above 1, to judge shadows; nothing that is tracked changes.", "",
+        (0.3, 3.0), (0.05, 10.0), 0.1)] = 1.0
+    display: str = ""
+
+    def __post_init__(self) -> None:
+        number(self, "exposure", least=-20.0, most=20.0)
+        number(self, "gamma", least=0.05, most=10.0)
+        if self.proxy not in PROXIES:
+            raise ValueError(f"PlateLook.proxy must be one of {', '.join(PROXIES)}, not {self.proxy!r}")
+
+
 class Workspace(Record):
     """Where the artist left off.
 
@@ -96,6 +121,7 @@ class Workspace(Record):
     mesh : id of the mesh that is posed and sculpted; None for the first with a rig.
     tool : name of the active tool; params : parameters of the tools by name as plain JSON values, never changed in
         place.
+    plate_look : how frames of plates are shown.
     """
 
     frame: float = 1001.0
@@ -109,6 +135,7 @@ class Workspace(Record):
     params: dict[str, Any] = {}  # noqa: RUF012 (msgspec makes a new one each time)
     respect: Respect = Respect()
     view: ViewOptions = ViewOptions()
+    plate_look: PlateLook = PlateLook()
 
     def __post_init__(self) -> None:
         number(self, "frame", least=-(2**31), most=2**31 - 1)

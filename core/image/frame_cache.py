@@ -19,7 +19,7 @@ POLL = 0.02  # s between two looks of somebody who waits whether it is still wan
 
 
 class GivenUp(Exception):
-    """Somebody who waited for a frame does not want it any more."""
+    """Somebody who waited for a frame does not want it any more, or who held it is closed."""
 
 
 class FrameCache:
@@ -97,6 +97,8 @@ class FrameCache:
         self._bytes = 0
 
     def _want(self, frame: int) -> Future[NDArray[Any] | None]:
+        if self._closed:
+            raise GivenUp
         if frame not in self._coming:
             self._coming[frame] = self._reader.submit(self._fetch, frame)
         return self._coming[frame]

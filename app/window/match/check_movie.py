@@ -21,8 +21,9 @@ from core.image.plate_view import plate_camera, plate_size
 from core.match.solved import SolvedCamera, row_of_frame
 from core.match.through import over_plate
 from core.overlay import Overlays, Polyline
+from core.workspace import PlateLook
 from viewport.overlay_drawing import TONES
-from viewport.plate_color import PlateColors
+from viewport.plate_color import PLAIN, PlateColors
 
 SHIFT = 4  # bits of a pixel's fraction that OpenCV draws with
 DARK, LETTERS = (12, 12, 14), (228, 230, 233)
@@ -31,11 +32,13 @@ DARK, LETTERS = (12, 12, 14), (228, 230, 233)
 def write_check_movie(
     path: Path, plate: Plate, solved: SolvedCamera, fps: float, root: Path | None,
     progress: Callable[[float], None], scene: Callable[[int], Drawn | None] | None = None, opacity: float = 1.0,
+    look: PlateLook = PLAIN,
 ) -> int:
     """Write the solved frames of a plate with what the solve puts over them; returns how many.
 
     Parameters
     ----------
+    look : how the plate is shown.
     scene, opacity : draws what stands in the document as the camera of a frame sees it, and how much of it is shown.
     root : folder the plate's path is told from, or None. progress : share of the frames that is done; when it raises
         Cancelled, what was drawn by then becomes a shorter movie.
@@ -47,7 +50,9 @@ def write_check_movie(
     def picture(frame: float) -> NDArray[np.uint8]:
         pixels = source.get(int(frame))
         wide, tall = plate_size(plate)
-        shown = np.zeros((tall, wide, 3), np.uint8) if pixels is None else colors.display(pixels, plate.color_space)
+        shown = np.zeros((tall, wide, 3), np.uint8)
+        if pixels is not None:
+            shown = colors.display(pixels, plate.color_space, look)
         drawn = None if scene is None else scene(int(frame))
         if drawn is not None:
             shown = over_plate(shown, drawn.pixels, drawn.through, opacity)

@@ -165,11 +165,13 @@ class MatchDoors(QObject):
 
         plate, solved, fps, saved = self._plate(), self._solved(), self._desk.document.fps, self._desk.session.path
         root = None if saved is None else saved.parent
-        document, opacity = self._desk.document, self._desk.workspace.view.over_plate
+        document, workspace = self._desk.document, self._desk.workspace
+        opacity, look = workspace.view.over_plate, workspace.plate_look
         scene = self._scene_at if self.draw_scene is not None and document.meshes and opacity else None
         self._write(
             f"Write {path.name}",
-            lambda progress, cancelled: write_check_movie(path, plate, solved, fps, root, progress, scene, opacity),
+            lambda progress, cancelled: write_check_movie(
+                path, plate, solved, fps, root, progress, scene, opacity, look),
             lambda count: self._desk.said.emit(f"{count} frames of the plate with the solve are in {path.name}."))
 
     def _scene_at(self, frame: int) -> Drawn | None:

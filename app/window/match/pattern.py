@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from app.window.match.marks import Sheet
 from app.window.match.screen import PlateScreen
 from core.document import Document
-from core.image.plate_view import plate_points
+from core.image.plate_view import plate_points, plate_size
 from core.match.track import Track, TrackSettings
 from core.overlay import Label, Marker, Overlay, Overlays, Polyline
 from tools.ground import Pointer
@@ -39,8 +39,9 @@ def patches(document: Document, screen: PlateScreen, sheet: Sheet, pointer: Poin
         shown += _of_track(tracks[-1], picture, screen, sheet)
     if pointer is not None and picture is not None:
         place = plate_points(sheet.camera, sheet.plate.pixel_aspect, (pointer.x, pointer.y), *sheet.size)[0]
-        if 0 <= place[0] < picture.shape[1] and 0 <= place[1] < picture.shape[0]:
-            shown.append((f"{place[0]:.1f}, {place[1]:.1f}", around(picture, place, AROUND)))
+        wide, tall = plate_size(sheet.plate)
+        if 0 <= place[0] < wide and 0 <= place[1] < tall:
+            shown.append((f"{place[0]:.1f}, {place[1]:.1f}", around(picture, place, AROUND, wide)))
     side, gap = SIDE * sheet.ratio, GAP * sheet.ratio
     insets: list[Inset] = []
     marks: list[Overlay] = []
@@ -56,9 +57,14 @@ def patches(document: Document, screen: PlateScreen, sheet: Sheet, pointer: Poin
     return Patches(tuple(insets), tuple(marks))
 
 
-def around(picture: NDArray[np.uint8], place: NDArray[np.float64], side: int) -> NDArray[np.uint8]:
-    """A square (side, side, 3) of a picture about a place, between its pixels too."""
-    cut = cv2.getRectSubPix(picture, (side, side), (float(place[0]), float(place[1])))
+def around(picture: NDArray[np.uint8], place: NDArray[np.float64], side: int, wide: int) -> NDArray[np.uint8]:
+    """A square (side, side, 3) of pixels of a plate about a place, between them too; `wide` is the plate's width, of
+    which the picture may be a smaller one."""
+    scale = picture.shape[1] / wide
+    x, y = (scale * (place - 0.5 * (side - 1) + 0.5) - 0.5).tolist()
+    cut = cv2.warpAffine(
+        picture, np.array([[scale, 0.0, x], [0.0, scale, y]]), (side, side),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(cut, np.uint8)
 
 
@@ -70,7 +76,8 @@ def _of_track(
         return []
     settings = track.settings or TrackSettings()
     side = settings.pattern + 8
-    now = around(picture, place + np.asarray(track.offset), side)
+    wide = plate_size(sheet.plate)[0]
+    now = around(picture, place + np.asarray(track.offset), side, wide)
     shown = [(f"frame {sheet.frame}", now)]
     before = track.keys[track.keys[:, 0] <= sheet.frame]
     key = before[-1] if len(before) else track.keys[0] if len(track.keys) else None
@@ -80,7 +87,7 @@ def _of_track(
     there = screen.pixels(sheet.plate, int(key[0]))
     if there is None:
         return shown
-    then = around(there, key[1:] + np.asarray(track.offset), side)
+    then = around(there, key[1:] + np.asarray(track.offset), side, wide)
     apart = LOOKS * (now.astype(np.float32) - then.astype(np.float32))
     differs = np.clip(128.0 + apart - apart.mean(), 0.0, 255.0).astype(np.uint8)
     return [(f"key {int(key[0])}", then), *shown, ("difference", differs)]

@@ -17,12 +17,16 @@ from core.document import Document
 from core.field import Field, field
 from core.image.plate import MOST_SIDE, ChannelMix, FilmBack, Plate
 from core.record import Record
+from core.workspace import PlateLook, Workspace
 from tools import plate_edits
 from tools.match_edits import shown_plate
-from viewport.plate_color import color_spaces
+from viewport.plate_color import color_spaces, displays
 
 _SPACE = Field("Colour space", "What the numbers of the files mean, by its name in the configuration of OpenColorIO "
                "($OCIO, else a built-in one); it changes what is shown, never the plate.")
+_ON = Field("Shown on", "The display and view of the configuration of OpenColorIO that the plate is shown through; "
+            "nothing that is tracked or written changes.")
+FIRST = "as configured"
 _ROLE = Qt.ItemDataRole.UserRole
 _SIDES = ("left", "top", "right", "bottom")
 AS_FILE = "as the file says"
@@ -86,6 +90,17 @@ class PlatePanel(QWidget):
         self.seen_by = Section("What tracking sees", looks, memory, "plate mix")
         self.space = ChoiceBar(_SPACE, "", "", ("",), (AS_FILE,))
         self.space.edited.connect(self._coloured)
+        self.on = ChoiceBar(_ON, "", "", ("",), (FIRST,))
+        self.on.edited.connect(self._shown_on)
+        self.look = RecordForm(desk.workspace.plate_look)
+        self.look.changed.connect(self._looked_at)
+        screen = QWidget()
+        lines = QVBoxLayout(screen)
+        lines.setContentsMargins(0, 0, 0, 0)
+        lines.setSpacing(4)
+        lines.addWidget(Row(_ON.label, self.on))
+        lines.addWidget(self.look)
+        self.screen = Section("On the screen", screen, memory, "plate screen")
         within.addWidget(Row(_SPACE.label, self.space))
         within.addLayout(self._settings)
         self._spaces_asked = False
@@ -101,12 +116,14 @@ class PlatePanel(QWidget):
         for widget in (self.said, self.list, self.about):
             column.addWidget(widget)
         column.addLayout(grid)
+        column.addWidget(self.screen)
         column.addWidget(self.seen_by)
         column.addWidget(self.film)
         self._seen: tuple[object, ...] = ()
         self._formed: Plate | None = None
         self.list.itemClicked.connect(self._clicked)
         desk.changed.connect(self._document_changed)
+        desk.workspace_changed.connect(self._workspace_changed)
         desk.session_replaced.connect(self.refresh)
         desk.stroke_ended.connect(self.refresh)
         self.refresh()
@@ -140,7 +157,7 @@ class PlatePanel(QWidget):
         self._show_forms(plate)
 
     def _show_forms(self, plate: Plate | None) -> None:
-        for part in (self.film, self.seen_by):
+        for part in (self.screen, self.film, self.seen_by):
             part.setVisible(plate is not None)
         if plate is not None:
             self._ask_spaces()
@@ -200,11 +217,25 @@ class PlatePanel(QWidget):
             return
         self._spaces_asked = True
 
-        def done(names: tuple[str, ...]) -> None:
-            self.space.set_choices(("", *names), (AS_FILE, *names))
+        def done(names: tuple[tuple[str, ...], tuple[str, ...]]) -> None:
+            spaces, shown_on = names
+            self.space.set_choices(("", *spaces), (AS_FILE, *spaces))
+            self.on.set_choices(("", *shown_on), (FIRST, *shown_on))
 
         self.desk.jobs.start(
-            "Read colour spaces", lambda progress, cancelled: color_spaces(), done, self.desk.error, self)
+            "Read colour spaces", lambda progress, cancelled: (color_spaces(), displays()), done, self.desk.error, self)
+
+    def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
+        if old.plate_look is not new.plate_look:
+            self.look.set_record(new.plate_look)
+            self.on.set_value(new.plate_look.display)
+
+    def _looked_at(self, look: PlateLook, final: bool) -> None:
+        self.desk.set_workspace(plate_look=look.replace(display=self.desk.workspace.plate_look.display))
+
+    def _shown_on(self, display: str, final: bool) -> None:
+        if final:
+            self.desk.set_workspace(plate_look=self.desk.workspace.plate_look.replace(display=display))
 
     def _coloured(self, space: str, final: bool) -> None:
         plate = shown_plate(self.desk.document)

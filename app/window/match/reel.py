@@ -16,6 +16,7 @@ from core.formats.plate_file import PlateFrames
 from core.image.frame_cache import FrameCache
 from core.image.mix import mixed
 from core.image.plate import ChannelMix, Plate
+from core.workspace import PROXIES, PlateLook
 from viewport.plate_color import PlateColors
 
 FILES = 256 << 20  # bytes of frames as the files have them: what both others are made of
@@ -25,14 +26,16 @@ AHEAD = 8
 class Reel:
     """Frames of one plate, held within `budget` bytes. Closed by who opened it, when no job reads from it any more.
 
-    shown : as the screen shows them, uint8. mix : through which tracking looks at them; what it sees is made along.
+    look : how the screen shows them. shown : as it does, uint8, smaller where a proxy is chosen.
+    mix : through which tracking looks at them; what it sees is made along with full frames.
     """
 
-    def __init__(self, plate: Plate, root: Path | None, budget: int) -> None:
-        self.plate, self.root, self.mix = plate, root, plate.mix
+    def __init__(self, plate: Plate, root: Path | None, budget: int, look: PlateLook) -> None:
+        self.plate, self.root, self.mix, self.look = plate, root, plate.mix, look
         self._colors = PlateColors()
         self._decoder = FrameDecoder()
         self._source = PlateFrames(plate, self._decoder, root=root, ahead=0, budget=min(FILES, budget // 4))
+        self._proxy = self._smaller(look)
         self._half = (budget - min(FILES, budget // 4)) // 2
         self.shown = FrameCache(self._display, plate.frames, self._half, AHEAD)
         self._seen: tuple[ChannelMix, FrameCache] | None = None
@@ -44,6 +47,23 @@ class Reel:
         """Of all frames held."""
         seen = self._seen
         return self._source.cache.bytes + self.shown.bytes + (0 if seen is None else seen[1].bytes)
+
+    def show_with(self, look: PlateLook) -> None:
+        """Show frames in another way; they are not read again for it, unless as another proxy."""
+        if look is self.look:
+            return
+        if look.proxy != self.look.proxy:
+            if self._proxy is not None:
+                self._proxy.close()
+            self._proxy = self._smaller(look)
+        self.look = look
+        self.shown.close()
+        self.shown = FrameCache(self._display, self.plate.frames, self._half, AHEAD)
+
+    def _smaller(self, look: PlateLook) -> PlateFrames | None:
+        smaller = PROXIES.index(look.proxy)
+        return None if not smaller else PlateFrames(
+            self.plate, self._decoder, root=self.root, ahead=0, proxy=2**smaller, budget=1)
 
     def seen(self, mix: ChannelMix) -> FrameCache:
         """Frames (H, W, C) float32 as tracking sees them through a mix; others are let go of."""
@@ -81,11 +101,14 @@ class Reel:
         if self._seen is not None:
             self._seen[1].close()
         self._source.close()
+        if self._proxy is not None:
+            self._proxy.close()
         self._decoder.close()
 
     def _display(self, frame: int) -> NDArray[np.uint8]:
-        pixels = self._raw(frame)
-        made = self._colors.display(pixels, self.plate.color_space)
+        if self._proxy is not None:
+            return self._colors.display(self._proxy.read(frame), self.plate.color_space, self.look)
+        made = self._colors.display(self._raw(frame), self.plate.color_space, self.look)
         self.seen(self.mix).expect(frame)
         return made
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import CancelledError
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,10 +111,12 @@ class PlateScreen(QObject):
                 if not isinstance(error, Cancelled):
                     self._desk.error(error)
 
+        frames = reel.shown
+
         def read(progress: Progress, cancelled: Asked) -> None:
             try:
-                reel.shown.get(frame, cancelled)
-            except GivenUp:
+                frames.get(frame, cancelled)
+            except (GivenUp, CancelledError):
                 raise Cancelled from None
 
         self._desk.jobs.start(f"Read frame {frame}", read, done, failed, self)
@@ -121,12 +124,14 @@ class PlateScreen(QObject):
     def _opened(self, plate: Plate) -> Reel:
         path = self._desk.session.path
         root = None if path is None else path.parent
+        look = self._desk.workspace.plate_look
         key = (plate.path, plate.first, plate.last, plate.width, plate.height, plate.crop, plate.color_space,
                plate.offset, root)
         if self._reel is None or key != self._key:
             self.close()
-            self._reel, self._key = Reel(plate, root, self.budget), key
+            self._reel, self._key = Reel(plate, root, self.budget, look), key
         self._reel.mix = plate.mix
+        self._reel.show_with(look)
         return self._reel
 
     def _blank(self, plate: Plate) -> NDArray[np.uint8]:

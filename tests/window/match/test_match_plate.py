@@ -353,3 +353,36 @@ def test_tracks_go_out_and_in_by_the_dialogs_and_a_click_on_their_span_goes_to_a
     assert not area.intersects(tree.visualItemRect(last))
     desk.edit("Select tracks", edits.select_tracks, (last.data(0, Qt.ItemDataRole.UserRole),))
     assert area.intersects(tree.visualItemRect(last)), "the active track is brought into view"
+
+
+def test_a_plate_is_shown_smaller_brighter_and_picked_as_well(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    window, desk = hand.window, hand.window.desk
+    panel = window.findChild(PlatePanel)
+    assert panel is not None
+    hand.finish()
+    one, frame = desk.document.plates[0], window.match.eye.frame
+    full = window.match.screen.pixels(one, frame)
+    assert full is not None
+    assert full.shape == (HEIGHT, WIDTH, 3)
+    choice = panel.look.fields["proxy"]
+    choice.enter("half")
+    hand.finish()
+    half = window.match.screen.pixels(one, frame)
+    assert half is not None
+    assert half.shape == (HEIGHT // 2, WIDTH // 2, 3)
+    window.commands.run("tool.track_point")
+    click(hand, START)
+    np.testing.assert_allclose(desk.document.tracks[-1].points[0], START, atol=0.8)  # within a pixel of the screen
+    panel.look.fields["exposure"].enter(1.0)
+    hand.finish()
+    brighter = window.match.screen.pixels(one, frame)
+    assert brighter is not None
+    assert brighter.mean() > 1.2 * half.mean()
+    choice.enter("full")
+    panel.look.fields["exposure"].enter(0.0)
+    hand.finish()
+    again = window.match.screen.pixels(one, frame)
+    assert again is not None
+    np.testing.assert_array_equal(again, full)
+    assert desk.workspace.plate_look.proxy == "full"
