@@ -118,9 +118,12 @@ def layer_again(
 
 
 def layer_around(
-    feathers: Feathers, laid: Layered, pinned: NDArray[np.int32], bvh: Bvh, workers: Workers
+    feathers: Feathers, laid: Layered, pinned: NDArray[np.int32], bvh: Bvh, workers: Workers, at_rest: bool = True,
 ) -> Layered:
-    """The coat after the vanes of the rows `pinned` (n,) int32 were put elsewhere by hand: others make way."""
+    """The coat after the vanes of the rows `pinned` (n,) int32 were put elsewhere by hand: others make way.
+
+    at_rest : with as much change as it takes; False for a frame of an animation, see ``settle_rows``.
+    """
     rank = feathers.rank.copy()
     rank[pinned] = np.inf  # they lie where they lie, all others over them
     boxes = laid.boxes.copy()
@@ -139,7 +142,7 @@ def layer_around(
         poses=poses, vanes=vanes, boxes=boxes, first=np.concatenate([laid.first[kept], first]),
         second=np.concatenate([laid.second[kept], second]),
     )
-    _settle(feathers._replace(rank=rank), moved, suspects, bvh, BENT_BACK)
+    _settle(feathers._replace(rank=rank), moved, suspects, bvh, BENT_BACK, at_rest)
     return moved
 
 

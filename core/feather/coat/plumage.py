@@ -105,8 +105,9 @@ class Plumage:
         base, layered = resting, rest.layered
         if not still:
             base = self._base(coat, keys, mesh, bed, self._binding(coat, keys, mesh), rest_frame, skin, frame)
-            poses = base.poses + (rest.layered.poses - resting.poses)
-            poses[:, LENGTH] = base.poses[:, LENGTH] * rest.layered.poses[:, LENGTH] / resting.poses[:, LENGTH]
+            settled = self._winged(coat, mesh, rest, rest_frame).layered.poses[: len(resting.poses)]
+            poses = base.poses + (settled - resting.poses)
+            poses[:, LENGTH] = base.poses[:, LENGTH] * settled[:, LENGTH] / resting.poses[:, LENGTH]
             if coat.layered:
                 layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, at_rest=False)
             else:
@@ -130,9 +131,10 @@ class Plumage:
         if not coat.wings:
             return laid
         by_itself = frame if wings_move(coat.wings) else None
+        name = "wings at rest" if laid.skin.points is mesh.points else "wings"
         made: Laid = self._remember(
-            "wings", lambda: winged(coat, mesh, laid, frame, self._evaluator), coat, mesh, laid.layered,
-            laid.skin.points, by_itself)
+            name, lambda: winged(coat, mesh, laid, frame, self._evaluator), coat, mesh, laid.layered, laid.skin.points,
+            by_itself)
         return made
 
     # -- stages --------------------------------------------------------------------------------------------

@@ -61,7 +61,8 @@ def winged(coat: FeatherCoat, mesh: Mesh, laid: Laid, frame: float, evaluator: E
     )
     if coat.layered and before:
         pinned = np.arange(before, before + len(own), dtype=np.int32)
-        layered = layer_around(feathers, layered, pinned, laid.skin.bvh, evaluator.workers)
+        layered = layer_around(
+            feathers, layered, pinned, laid.skin.bvh, evaluator.workers, laid.skin.points is mesh.points)
     bed = _bed(coat, mesh, laid.bed, wings, evaluator)
     shown = np.concatenate([laid.shown, np.ones(len(own), np.bool_)])
     return Laid(bed.places.ids, shown, layered, feathers, bed, laid.skin, _fields(laid.fields, bed, wings))
