@@ -76,16 +76,37 @@ def normal_equations(state: State, observations: Observations, scale: float, fre
     frames, points, count = len(state.rotation), len(state.points), len(observations.frame)
     lens = len(state.lens)
     blocks = (
-        np.zeros((frames, FRAME_COLUMNS, FRAME_COLUMNS)), np.zeros((frames, FRAME_COLUMNS)),
-        np.zeros((count, FRAME_COLUMNS, 3)), np.zeros((points, 3, 3)), np.zeros((points, 3)),
-        np.zeros((lens, lens)), np.zeros(lens),
-        np.zeros((frames, FRAME_COLUMNS, lens)), np.zeros((points, 3, lens)),
+        np.zeros((frames, FRAME_COLUMNS, FRAME_COLUMNS)),
+        np.zeros((frames, FRAME_COLUMNS)),
+        np.zeros((count, FRAME_COLUMNS, 3)),
+        np.zeros((points, 3, 3)),
+        np.zeros((points, 3)),
+        np.zeros((lens, lens)),
+        np.zeros(lens),
+        np.zeros((frames, FRAME_COLUMNS, lens)),
+        np.zeros((points, 3, lens)),
     )
     right_of_frames, of_points, right_of_points = blocks[1], blocks[3], blocks[4]
     cost = accumulate(
-        observations.frame, observations.track, observations.xy, observations.root, state.rotation,
-        state.translation, state.points, state.focal, state.lens, scale, blocks[0], right_of_frames, blocks[2],
-        right_of_points, of_points, blocks[5], blocks[6], blocks[7], blocks[8],
+        observations.frame,
+        observations.track,
+        observations.xy,
+        observations.root,
+        state.rotation,
+        state.translation,
+        state.points,
+        state.focal,
+        state.lens,
+        scale,
+        blocks[0],
+        right_of_frames,
+        blocks[2],
+        right_of_points,
+        of_points,
+        blocks[5],
+        blocks[6],
+        blocks[7],
+        blocks[8],
     )
     if free.zoom is not None:
         pull = free.zoom @ state.focal
@@ -100,14 +121,24 @@ def normal_equations(state: State, observations: Observations, scale: float, fre
 
 
 def adjust(
-    state: State, observations: Observations, free: Free = RIGID, *, scale: float = 0.0, iterations: int = 30,
-    tolerance: float = 1e-7, damping: float = 1e-4, least_damping: float = LEAST_DAMPING,
+    state: State,
+    observations: Observations,
+    free: Free = RIGID,
+    *,
+    scale: float = 0.0,
+    iterations: int = 30,
+    tolerance: float = 1e-7,
+    damping: float = 1e-4,
+    least_damping: float = LEAST_DAMPING,
+    settled: float = MOST_DAMPING,
 ) -> Adjusted:
     """Move what is free to where the (robust) squares of the whitened residuals are least.
 
     scale : of the Cauchy loss in standard deviations; 0 means plain squares.
     tolerance : ends when a step lowers the cost by less than this part.
     least_damping : above 0 where something cannot be told, as the distance of points seen by a camera that only turns.
+    settled : it ends at no greater damping than this, which would hold what is told weakly where it began: a zoom of a
+        long lens against the way ahead.
     """
     normal = normal_equations(state, observations, scale, free)
     tried = 0
@@ -121,7 +152,9 @@ def adjust(
                 state, normal = moved, after
                 damping = max(damping * 0.1, least_damping)
                 if gained < tolerance * max(normal.cost, 1e-30):
-                    break
+                    if damping <= max(settled, least_damping):
+                        break
+                    damping = max(damping * 0.01, settled, least_damping)
                 continue
         damping *= 10.0
     return Adjusted(state, normal.cost, tried)
@@ -212,9 +245,7 @@ def _points_kept(normal: Normal, observations: Observations, free: Free) -> _Sid
             matrix[at[observations.track], own[:, None]] = normal.crossed[:, FRAME_FOCAL]
         if free.zoom is not None:
             matrix[np.ix_(zooms, zooms)] += free.zoom
-    return _Sides(
-        matrix, right, normal.frames[:, poses][:, :, poses], normal.frames_right[:, poses], coupling
-    )
+    return _Sides(matrix, right, normal.frames[:, poses][:, :, poses], normal.frames_right[:, poses], coupling)
 
 
 def _with_lens(normal: Normal, lens: list[int], size: int) -> tuple[Array, Array]:
@@ -291,8 +322,11 @@ def _moved(state: State, step: Step | None, free: Free) -> State | None:
     if turns.any():
         rotation = Rotation.from_rotvec(turns).as_matrix() @ rotation
     return State(
-        np.ascontiguousarray(rotation), state.translation + step.frames[:, 3:6], state.points + step.points,
-        state.focal + step.frames[:, FRAME_FOCAL], state.lens + step.lens,
+        np.ascontiguousarray(rotation),
+        state.translation + step.frames[:, 3:6],
+        state.points + step.points,
+        state.focal + step.frames[:, FRAME_FOCAL],
+        state.lens + step.lens,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.match.solve.bundle import POSE, TURN, Adjusted, Free, adjust
+from core.match.solve.slides import correlation
 from core.match.solve.state import FRAME_FOCAL, Array, Observations, State, bearings
 
 ROUNDS = 8  # of reweighting
@@ -32,8 +33,15 @@ def turn_between(first: Array, second: Array, noise: float) -> Array:
 
 
 def solve_nodal(
-    observations: Observations, frames: int, tracks: int, lens: Array, noise: float, *, scale: float,
-    lens_columns: tuple[int, ...] = (), zoom: Array | None = None,
+    observations: Observations,
+    frames: int,
+    tracks: int,
+    lens: Array,
+    noise: float,
+    *,
+    scale: float,
+    lens_columns: tuple[int, ...] = (),
+    zoom: Array | None = None,
 ) -> Adjusted | None:
     """Rotations of all frames with every track at distance 1; None when the frames hang together by too few tracks.
 
@@ -59,8 +67,13 @@ def solve_nodal(
     state = State(rotation, np.zeros((frames, 3)), points, np.zeros(frames), lens.copy())
     frame = (*TURN, FRAME_FOCAL) if zoom is not None else TURN
     return adjust(
-        state, observations, Free(frame=frame, lens=lens_columns, zoom=zoom), scale=scale, least_damping=DISTANCE,
-        iterations=12, tolerance=1e-3,
+        state,
+        observations,
+        Free(frame=frame, lens=lens_columns, zoom=zoom),
+        scale=scale,
+        least_damping=DISTANCE,
+        iterations=12,
+        tolerance=1e-3,
     )
 
 
@@ -84,5 +97,7 @@ def parallax(state: State, observations: Observations, sigma: float) -> float:
     turning = adjust(begin, part, Free(frame=TURN), iterations=10, tolerance=1e-6, least_damping=DISTANCE)
     moving = adjust(turning.state, part, Free(frame=POSE), iterations=60, tolerance=1e-5, least_damping=DISTANCE)
     added = 3 * len(kept) + len(np.unique(part.track))
-    fallen = (turning.cost - moving.cost) / max(sigma, 1e-12) ** 2
+    # what wanders from frame to frame counts as fewer observations; what a movement would leave is not taken for that
+    wander = min(max(correlation(moving.state, part), 0.0), 0.95)
+    fallen = (turning.cost - moving.cost) / max(sigma, 1e-12) ** 2 * (1.0 - wander) / (1.0 + wander)
     return float((fallen - added) / np.sqrt(2.0 * added))

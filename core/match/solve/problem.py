@@ -33,6 +33,10 @@ FLOOR = 0.5  # pixels: noise where too few tracks are seen together to tell it
 HYPOTHESES = 6
 LEAST_DOUBTED = 6  # tracks of a frame in which some do not fit
 ROUNDS_OUT = 5  # of leaving out what does not fit; two, and more while slow slides are found
+SETTLED = 1e-8  # damping that holds nothing back
+BEGUN, DECLARED = 1.0, 100.0  # of the square of the logarithm by which a zoom starts at another focal length
+# than the given one: steps do not walk along what the tracks cannot tell; the doubts of it are told without that
+ZOOM_STEPS = 300  # at most: a zoom of a long lens looks nearly like walking ahead, along a bent valley
 REBENT = 1e-3  # of a number of a lens that was taken for another
 
 
@@ -79,16 +83,29 @@ class Problem:
     """Tracks and a first lens. :meth:`begin` finds keyframes and their cameras, :meth:`finish` the rest.
 
     ramp : of the logarithm of the focal length from the first frame to the last, where a zoom is tried.
+    asked : whether the zoom of the options is what was asked for, so that the focal length given is only a beginning.
     """
 
     def __init__(
-        self, observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
-        views: Views, focal: float, progress: Callable[[str], None], ramp: float = 0.0,
+        self,
+        observations: Observations,
+        frames: Rows,
+        tracks: int,
+        size: tuple[int, int],
+        options: Options,
+        views: Views,
+        focal: float,
+        progress: Callable[[str], None],
+        ramp: float = 0.0,
+        *,
+        asked: bool = True,
     ) -> None:
         pace = np.exp(ramp * (frames - frames[0]) / max(1, int(frames[-1] - frames[0])))
         self.observations, self.pixel = as_one(observations, views, focal, pace)
         self.focal = focal
         self.frames, self.tracks, self.size, self.views = frames, tracks, size, views
+        declared = options.focal is not None and not options.free_focal and not (options.zoom and asked)
+        self.level = DECLARED if declared else BEGUN
         self.pixels, told = _noise(self.observations, views, size)
         self.noise = self.pixels * float(np.median(self.observations.root[:, 0]))
         self.noise_told = told
@@ -148,8 +165,14 @@ class Problem:
             if best is not None and best.doubt < WORSE and richness_of(columns, zoom) > best.richness:
                 continue
             done = solve_nodal(
-                self.part, len(self.keys), self.tracks, lens, self.pixels, scale=2.5 * self.noise,
-                lens_columns=columns, zoom=self._tied(rows, zoom=zoom),
+                self.part,
+                len(self.keys),
+                self.tracks,
+                lens,
+                self.pixels,
+                scale=2.5 * self.noise,
+                lens_columns=columns,
+                zoom=self._tied(rows, zoom=zoom),
             )
             if done is None:
                 continue
@@ -242,17 +265,27 @@ class Problem:
         state, known, held = self._between(start, nodal)
         observations, count = self.observations, len(self.frames)
         zoom = self._tied(np.arange(count), zoom=start.zoom)
+        held_zoom = zoom
+        if start.zoom and zoom is not None and not self.views.alone.any():
+            held_zoom = zoom + self.level * (np.arange(count) == 0) * np.eye(count)
         columns = (TURN if nodal else POSE) + ((FRAME_FOCAL,) if zoom is not None else ())
         lens = start.lens_columns
         if self.options.distortion:
             lens = tuple(sorted({*lens, *model_named(self.options.lens).found}))
-        free = Free(frame=columns, lens=lens, zoom=zoom)
+        free = Free(frame=columns, lens=lens, zoom=held_zoom)
         least = 1e-6 if nodal else 1e-12
         used = known[observations.frame] & held[observations.track]
         self.progress("adjusting all frames together")
         spread = max(self.least, self._spread(state, observations, used))
         state = adjust(
-            state, observations.take(used), free, scale=2.5 * spread, tolerance=1e-4, least_damping=least, iterations=20
+            state,
+            observations.take(used),
+            free,
+            scale=2.5 * spread,
+            tolerance=1e-6 if start.zoom else 1e-4,
+            least_damping=least,
+            iterations=ZOOM_STEPS if start.zoom else 20,
+            settled=SETTLED,
         ).state
         sliders = np.zeros(self.tracks, bool)
         for k in range(ROUNDS_OUT):
@@ -266,14 +299,24 @@ class Problem:
             sliders |= more
             error = np.linalg.norm(residuals(state, observations), axis=1) / spread
             dof = np.maximum(2.0 * np.bincount(observations.track[used], minlength=self.tracks) - 3.0, 1.0)
-            chi = np.bincount(
-                observations.track[used], weights=np.minimum(error[used], 50.0) ** 2, minlength=self.tracks) / dof
+            chi = (
+                np.bincount(observations.track[used], weights=np.minimum(error[used], 50.0) ** 2, minlength=self.tracks)
+                / dof
+            )
             held = held & (chi < 1.5 + 5.0 * np.sqrt(2.0 / dof)) & ~sliders
             used = known[observations.frame] & held[observations.track] & (error < OUTLIER)
             seen = np.bincount(observations.track[used], minlength=self.tracks)
             held = held & (seen >= 2)
             used &= held[observations.track]
-            state = adjust(state, observations.take(used), free, tolerance=1e-6, least_damping=least).state
+            state = adjust(
+                state,
+                observations.take(used),
+                free,
+                tolerance=1e-8 if start.zoom else 1e-6,
+                least_damping=least,
+                iterations=ZOOM_STEPS if start.zoom else 30,
+                settled=SETTLED,
+            ).state
         of_frame = np.bincount(observations.frame[used], minlength=count)
         seen_there = np.bincount(observations.frame, minlength=count)
         # four tracks may fit a wrong camera when the fifth, which does not, was left out for it
@@ -284,8 +327,22 @@ class Problem:
         exact = EXACT * self.noise / self.pixels  # of tracks that were computed: doubts are still those of a picture
         sigma = max(float(np.sqrt((final**2).sum() / max(1, freedom))), exact)
         return Solution(
-            state, self.frames, known, held, used, observations, start.kind, self.noise, sigma, tuple(self.keys),
-            self.size, free, (*self._changed(state, start), *start.said), self.pixel, self.views, self.noise_told,
+            state,
+            self.frames,
+            known,
+            held,
+            used,
+            observations,
+            start.kind,
+            self.noise,
+            sigma,
+            tuple(self.keys),
+            self.size,
+            free._replace(zoom=zoom),
+            (*self._changed(state, start), *start.said),
+            self.pixel,
+            self.views,
+            self.noise_told,
         )
 
     def _spread(self, state: State, observations: Observations, used: Flags) -> float:
@@ -332,8 +389,10 @@ class Problem:
             turns, centres = rotation[at], -np.einsum("fji,fj->fi", rotation[at], translation[at])
             turn = Slerp(at.astype(float), Rotation.from_matrix(turns))(inside).as_matrix() if len(at) > 1 else turns
             centre = np.stack([np.interp(inside, at, centres[:, k]) for k in range(3)], axis=1)
-            rotation[shot], translation[shot] = turn, -np.einsum("fij,fj->fi", np.broadcast_to(
-                turn, (len(shot), 3, 3)), centre)
+            rotation[shot], translation[shot] = (
+                turn,
+                -np.einsum("fij,fj->fi", np.broadcast_to(turn, (len(shot), 3, 3)), centre),
+            )
             zoom[shot] = np.interp(inside, at, zoom[at])
             reach[shot] = True
         return State(rotation, translation, cameras.state.points, zoom, cameras.state.lens), reach

@@ -9,6 +9,7 @@ import numpy as np
 
 from core.errors import UserError
 from core.match.solve.certainty import Certainty, Fix, Test
+from core.match.solve.motions import told_of_motions
 from core.match.solve.nodal import BY_CHANCE, parallax
 from core.match.solve.solution import Solution
 from core.match.solve.state import FOCAL, FRAME_FOCAL, K1, LENS_NAMES, Array, Rows, residuals
@@ -101,15 +102,29 @@ def report(solution: Solution, names: list[str], said: Sequence[str] | None = No
         gain = parallax(state, part, solution.sigma)
         tests = (*tests, Test(TRANSLATION, gain if gain > BY_CHANCE else 0.0, 0.0))
     sigma_f = certain.focal_sigma()
-    warnings = [*solution.said, *_warnings(solution, noisy, out, path, sigma_f, tests)]
+    moves = told_of_motions(solution) if path <= PATH else []  # a short path has its own words
+    warnings = [*solution.said, *_warnings(solution, noisy, out, path, sigma_f, tests), *moves]
     typical = float(np.median(focal[solution.known & (solution.views.camera == 0)]))
     rms = float(np.sqrt((length**2).mean()))
     fixes = tuple(fix for fix in certain.fixes(rms, by_frame, by_track, path) if fix.rms_px < rms or fix.share > MOVES)
     return Report(
-        rms, float(np.median(length)), float(length.mean()),
-        float(np.quantile(length, 0.95)), float(length.max()), by_frame, by_track, focal, sigma_f * typical, path,
-        certain.points, certain.centres(), kind, tests, tuple(warnings),
-        _advice(solution, names, said, rms, by_frame, by_track, fixes), fixes,
+        rms,
+        float(np.median(length)),
+        float(length.mean()),
+        float(np.quantile(length, 0.95)),
+        float(length.max()),
+        by_frame,
+        by_track,
+        focal,
+        sigma_f * typical,
+        path,
+        certain.points,
+        certain.centres(),
+        kind,
+        tests,
+        tuple(warnings),
+        _advice(solution, names, said, rms, by_frame, by_track, fixes),
+        fixes,
     )
 
 
@@ -138,12 +153,12 @@ def _warnings(
     said = []
     focal = float(np.exp(solution.state.lens[FOCAL]))
     if noisy > NOISE:
-        said.append(
-            f"The tracks miss the camera by {noisy:.2f} times their own noise: something is not in the model.")
+        said.append(f"The tracks miss the camera by {noisy:.2f} times their own noise: something is not in the model.")
     if not solution.noise_told and not solution.views.alone.all():
         said.append(
             "Fewer than ten tracks are seen together: that they fit says little, a wrong one among them may bend the "
-            "path unseen. Add tracks.")
+            "path unseen. Add tracks."
+        )
     if out > OUT:
         said.append(f"{round(100 * out)} % of the tracks do not fit and were left out; do they move by themselves?")
     if path > PATH:
@@ -151,14 +166,17 @@ def _warnings(
     if sigma_f > FOCAL_SIGMA:
         said.append(
             f"The focal lengths are known to {100 * sigma_f:.1f} % only, by one factor on all frames: tracks that are "
-            "nearer and farther would tell it." if FRAME_FOCAL in solution.free.frame else
-            f"The focal length is known to {100 * sigma_f:.1f} % only; give it if you know it.")
+            "nearer and farther would tell it."
+            if FRAME_FOCAL in solution.free.frame
+            else f"The focal length is known to {100 * sigma_f:.1f} % only; give it if you know it."
+        )
     if any(test.name == TRANSLATION and test.gain for test in tests):
         bends = next((test for test in tests if test.name == LENS_NAMES[K1] and test.gain > GAIN), None)
         said.append(
             "The camera moves a little, as the parallax of the tracks shows: solved as one that only turns, its "
             "rotations are off by that. Add tracks that are near, so that the path can be told."
-            + (f" A lens that bends looks alike, k1 about {bends.better:+.4f}; solve with a lens." if bends else ""))
+            + (f" A lens that bends looks alike, k1 about {bends.better:+.4f}; solve with a lens." if bends else "")
+        )
         tests = ()  # what the lens seems to do is what that movement does
     strong = [test for test in tests if test.gain > GAIN]
     for test in sorted(strong, key=lambda one: -one.gain)[:2]:
@@ -172,16 +190,23 @@ def _warnings(
     missing = ~solution.known
     if (missing & ~solution.views.alone).any():
         said.append(
-            f"{int((missing & ~solution.views.alone).sum())} frames have no camera: too few tracks are seen there.")
+            f"{int((missing & ~solution.views.alone).sum())} frames have no camera: too few tracks are seen there."
+        )
     if (missing & solution.views.alone).any():
         said.append(
             f"{int((missing & solution.views.alone).sum())} pictures of other cameras have no place: too little of the "
-            "plate is seen there.")
+            "plate is seen there."
+        )
     return said
 
 
 def _advice(
-    solution: Solution, names: list[str], said_of: Sequence[str], rms: float, by_frame: Array, by_track: Array,
+    solution: Solution,
+    names: list[str],
+    said_of: Sequence[str],
+    rms: float,
+    by_frame: Array,
+    by_track: Array,
     fixes: tuple[Fix, ...],
 ) -> tuple[str, ...]:
     """What to mend next, worst first."""
@@ -202,8 +227,7 @@ def _advice(
     counts = np.bincount(solution.observations.frame[solution.used], minlength=len(solution.frames))
     thin = np.flatnonzero((counts < 8) & ~solution.views.alone)
     if len(thin):
-        said.append(
-            f"Add tracks from {said_of[thin[0]]} to {said_of[thin[-1]]}: some have fewer than 8.")
+        said.append(f"Add tracks from {said_of[thin[0]]} to {said_of[thin[-1]]}: some have fewer than 8.")
     return tuple(said)
 
 

@@ -26,8 +26,13 @@ ROUNDS, REFOCUSED = 3, 0.002  # of a camera whose distortion was taken out at a 
 
 
 def solve(
-    observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options = AS_GIVEN,
-    progress: Callable[[str], None] = lambda words: None, views: Views | None = None,
+    observations: Observations,
+    frames: Rows,
+    tracks: int,
+    size: tuple[int, int],
+    options: Options = AS_GIVEN,
+    progress: Callable[[str], None] = lambda words: None,
+    views: Views | None = None,
 ) -> Solution:
     """Cameras and points from observations of `tracks` tracks in frames (F,) of `size` pixels.
 
@@ -39,8 +44,9 @@ def solve(
         There is no camera that explains the tracks, or it cannot be told; the message says why.
     """
     views = views or one_shot(len(frames), Camera(size))
-    views = views._replace(cameras=(
-        views.cameras[0]._replace(focal=options.focal, found=options.free_focal), *views.cameras[1:]))
+    views = views._replace(
+        cameras=(views.cameras[0]._replace(focal=options.focal, found=options.free_focal), *views.cameras[1:])
+    )
     if options.given is not None or (len(views.cameras) > 1 and options.lens != "brown"):
         views = views._replace(bend=options.lens_at(options.focal or float(size[0]), size))
     check(views)
@@ -65,19 +71,32 @@ def solve(
         if options.free_readout:
             used = np.flatnonzero(found.used)
             readout, sigma = found_readout(
-                found.state, observations.take(used), Motion(*(part[used] for part in moving)), found.free, readout,
-                found.sigma)
+                found.state,
+                observations.take(used),
+                Motion(*(part[used] for part in moving)),
+                found.free,
+                readout,
+                found.sigma,
+            )
         found = _best(
-            unrolled(observations, moving, readout), frames, tracks, size, options, progress, found.views, guesses)
+            unrolled(observations, moving, readout), frames, tracks, size, options, progress, found.views, guesses
+        )
     if options.free_readout:
-        found = found._replace(said=(
-            *found.said, f"The shutter reads the picture in {readout:.3f} +- {sigma:.3f} of a frame."))
+        found = found._replace(
+            said=(*found.said, f"The shutter reads the picture in {readout:.3f} +- {sigma:.3f} of a frame.")
+        )
     return found
 
 
 def _at_another_focal(
-    found: Solution, observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
-    progress: Callable[[str], None], views: Views,
+    found: Solution,
+    observations: Observations,
+    frames: Rows,
+    tracks: int,
+    size: tuple[int, int],
+    options: Options,
+    progress: Callable[[str], None],
+    views: Views,
 ) -> Solution:
     """The solve at a focal length far from the one given, where that leaves too much and another leaves far less."""
     if not _misses(found):
@@ -86,7 +105,8 @@ def _at_another_focal(
     free = options._replace(focal=None, free_focal=True)
     try:
         other = _best(
-            observations, frames, tracks, size, free, progress, views, [share * max(size) for share in FOCALS])
+            observations, frames, tracks, size, free, progress, views, [share * max(size) for share in FOCALS]
+        )
     except UserError:
         return found
     if _misses(other) or _left_out(other) > 0.5 * _left_out(found):
@@ -141,8 +161,12 @@ def _own_lens(
     part = observations.take(found.used & (number[observations.frame] >= 0))
     part = part._replace(frame=number[part.frame])
     state = State(
-        np.ascontiguousarray(found.state.rotation[frames]), found.state.translation[frames], found.state.points,
-        np.zeros(len(frames)), camera.lens(focal))
+        np.ascontiguousarray(found.state.rotation[frames]),
+        found.state.translation[frames],
+        found.state.points,
+        np.zeros(len(frames)),
+        camera.lens(focal),
+    )
     free = Free(lens=(FOCAL, K1) if looked else (K1,), points=False)
     lens = adjust(state, part, free, scale=2.5 * found.sigma).state.lens
     own = float(np.exp(lens[FOCAL])) if looked else camera.focal
@@ -150,8 +174,14 @@ def _own_lens(
 
 
 def _best(
-    observations: Observations, frames: Rows, tracks: int, size: tuple[int, int], options: Options,
-    progress: Callable[[str], None], views: Views, guesses: list[float],
+    observations: Observations,
+    frames: Rows,
+    tracks: int,
+    size: tuple[int, int],
+    options: Options,
+    progress: Callable[[str], None],
+    views: Views,
+    guesses: list[float],
 ) -> Solution:
     best: tuple[Start, Problem] | None = None
     for focal in guesses:
@@ -174,7 +204,8 @@ def _best(
         return found
     if not (options.distortion or options.zoom):
         other = Problem(
-            observations, frames, tracks, size, options._replace(distortion=True), views, problem.focal, progress)
+            observations, frames, tracks, size, options._replace(distortion=True), views, problem.focal, progress
+        )
         began = other.begin()
         if began.doubt < np.inf:
             bent = other.finish(began)
@@ -184,7 +215,17 @@ def _best(
     likely: tuple[Start, Problem] | None = None
     for ramp in RAMPS:
         other = Problem(
-            observations, frames, tracks, size, options._replace(zoom=True), views, problem.focal, progress, ramp)
+            observations,
+            frames,
+            tracks,
+            size,
+            options._replace(zoom=True),
+            views,
+            problem.focal,
+            progress,
+            ramp,
+            asked=options.zoom,
+        )
         began = other.begin()
         if began.doubt < np.inf and (likely is None or began.doubt < likely[0].doubt):
             likely = began, other
