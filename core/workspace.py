@@ -109,6 +109,13 @@ class PlateLook(Record):
         if self.proxy not in PROXIES:
             raise ValueError(f"PlateLook.proxy must be one of {', '.join(PROXIES)}, not {self.proxy!r}")
 
+    def words(self) -> str:
+        """What is not shown as it is, in a few words; "" for nothing."""
+        told = [f"exposure {self.exposure:+.1f} stops"] if self.exposure else []
+        told += [f"gamma {self.gamma:.2f}"] if self.gamma != 1.0 else []
+        told += [f"{self.proxy} proxy"] if self.proxy != "full" else []
+        return " · ".join(told)
+
 
 class Workspace(Record):
     """Where the artist left off.

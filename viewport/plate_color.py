@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ LINEAR = "scene_linear"  # the role of what floating pixels hold when nobody say
 
 
 class PlateColors:
-    """Turns frames into what a screen shows; used from one thread at a time. The configuration is read when needed.
+    """Turns frames into what a screen shows; from any thread. The configuration is read when needed.
 
     Whole numbers without a colour space are shown as they are, for pictures of that kind are made for the screen.
     """
@@ -28,6 +29,7 @@ class PlateColors:
         self._file = os.environ.get("OCIO", "") if file is None else file
         self._config: Any = None
         self._processors: dict[tuple[str, str, float], Any] = {}
+        self._lock = threading.Lock()
 
     def display(
         self, pixels: NDArray[Any], color_space: str = "", look: PlateLook = PLAIN
@@ -47,7 +49,9 @@ class PlateColors:
             shown = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
         else:
             light = np.ascontiguousarray(_three(to_float(pixels)), np.float32)
-            self._processor(color_space or LINEAR, look.display, look.exposure).applyRGB(light)
+            with self._lock:
+                processor = self._processor(color_space or LINEAR, look.display, look.exposure)
+            processor.applyRGB(light)
             shown = np.round(np.clip(light, 0.0, 1.0) ** (1.0 / look.gamma) * 255.0).astype(np.uint8)
         return np.ascontiguousarray(_three(shown))
 

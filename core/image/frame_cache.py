@@ -88,13 +88,14 @@ class FrameCache:
         """Bytes of the frames held."""
         return self._bytes
 
-    def close(self) -> None:
-        """Forget everything and end the thread."""
+    def close(self, *, wait: bool = True) -> None:
+        """Forget everything and end the thread, or without waiting let it end after the frame it reads."""
         with self._lock:
             self._closed = True
-        self._reader.shutdown(cancel_futures=True)
-        self._held.clear()
-        self._bytes = 0
+        self._reader.shutdown(wait=wait, cancel_futures=True)
+        with self._lock:
+            self._held.clear()
+            self._bytes = 0
 
     def _want(self, frame: int) -> Future[NDArray[Any] | None]:
         if self._closed:
@@ -118,6 +119,8 @@ class FrameCache:
         pixels.flags.writeable = False
         with self._lock:
             del self._coming[frame]
+            if self._closed:
+                return pixels
             self._held[frame] = pixels
             self._bytes += pixels.nbytes
             self._largest = max(self._largest, pixels.nbytes)

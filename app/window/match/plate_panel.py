@@ -91,6 +91,7 @@ class PlatePanel(QWidget):
         self.space = ChoiceBar(_SPACE, "", "", ("",), (AS_FILE,))
         self.space.edited.connect(self._coloured)
         self.on = ChoiceBar(_ON, "", "", ("",), (FIRST,))
+        self.on.set_value(desk.workspace.plate_look.display)
         self.on.edited.connect(self._shown_on)
         self.look = RecordForm(desk.workspace.plate_look)
         self.look.changed.connect(self._looked_at)
@@ -125,6 +126,7 @@ class PlatePanel(QWidget):
         desk.changed.connect(self._document_changed)
         desk.workspace_changed.connect(self._workspace_changed)
         desk.session_replaced.connect(self.refresh)
+        desk.session_replaced.connect(self._show_look)
         desk.stroke_ended.connect(self.refresh)
         self.refresh()
 
@@ -227,8 +229,12 @@ class PlatePanel(QWidget):
 
     def _workspace_changed(self, old: Workspace, new: Workspace) -> None:
         if old.plate_look is not new.plate_look:
-            self.look.set_record(new.plate_look)
-            self.on.set_value(new.plate_look.display)
+            self._show_look()
+
+    def _show_look(self) -> None:
+        look = self.desk.workspace.plate_look
+        self.look.set_record(look)
+        self.on.set_value(look.display)
 
     def _looked_at(self, look: PlateLook, final: bool) -> None:
         self.desk.set_workspace(plate_look=look.replace(display=self.desk.workspace.plate_look.display))

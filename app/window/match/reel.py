@@ -49,7 +49,7 @@ class Reel:
         return self._source.cache.bytes + self.shown.bytes + (0 if seen is None else seen[1].bytes)
 
     def show_with(self, look: PlateLook) -> None:
-        """Show frames in another way; they are not read again for it, unless as another proxy."""
+        """Show frames in another way; they are not read again for it, unless as another proxy. Never waits."""
         if look is self.look:
             return
         if look.proxy != self.look.proxy:
@@ -57,7 +57,7 @@ class Reel:
                 self._proxy.close()
             self._proxy = self._smaller(look)
         self.look = look
-        self.shown.close()
+        self.shown.close(wait=False)
         self.shown = FrameCache(self._display, self.plate.frames, self._half, AHEAD)
 
     def _smaller(self, look: PlateLook) -> PlateFrames | None:

@@ -98,7 +98,7 @@ class PlateScreen(QObject):
         self._reel, self._asked, self._last = None, None, None
 
     def _ask(self, reel: Reel, frame: int) -> None:
-        self._asked = frame
+        self._asked, frames = frame, reel.shown
 
         def done(found: Any) -> None:
             if self._reel is reel:
@@ -110,8 +110,8 @@ class PlateScreen(QObject):
                 self._asked = None
                 if not isinstance(error, Cancelled):
                     self._desk.error(error)
-
-        frames = reel.shown
+                elif reel.shown is not frames:  # it is looked at in another way by now, and to be asked for again
+                    self.fresh.emit()
 
         def read(progress: Progress, cancelled: Asked) -> None:
             try:

@@ -134,6 +134,8 @@ class PlateView(QObject):
             track = chosen[-1]
             lines.append(f"{track.name} · x {track.points[at[0], 0]:.3f} y {track.points[at[0], 1]:.3f} · "
                          f"error {errors_of(track)[at[0]]:.3f} px · likeness {track.score[at[0]]:.2f}")
+        if look := self.desk.workspace.plate_look.words():
+            lines.append((look, "accent"))
         if self.eye.still is not None:
             lines.append(("held still at a track", "accent"))
         if shown is None or (shown.frame != frame and not shown.words):

@@ -386,3 +386,42 @@ def test_a_plate_is_shown_smaller_brighter_and_picked_as_well(opened: Opened, pl
     assert again is not None
     np.testing.assert_array_equal(again, full)
     assert desk.workspace.plate_look.proxy == "full"
+
+
+def test_a_look_is_no_step_takes_hold_while_frames_are_read_and_is_saved(
+    opened: Opened, plate: Path, tmp_path: Path,
+) -> None:
+    hand = opened_plate(opened, plate)
+    desk, panel, screen = hand.window.desk, hand.window.findChild(PlatePanel), hand.window.match.screen
+    (film,) = desk.document.plates
+    before = desk.document
+    hand.rest()
+    plain = screen.pixels(film, hand.window.match.eye.frame)
+    assert plain is not None
+    for stops in (0.5, 1.0, 1.5, 2.0):  # as a hand drags: every next one while the frame of the last is made
+        panel.look.fields["exposure"].enter(stops)
+        hand.painted()
+    hand.until(lambda: screen.pixels(film, hand.window.match.eye.frame) is not None)
+    hand.rest()
+    bright = screen.pixels(film, hand.window.match.eye.frame)
+    light = np.where(plain <= 10, plain / 255.0 / 12.92, ((plain / 255.0 + 0.055) / 1.055) ** 2.4) * 4.0
+    truth = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    assert bright is not None
+    assert np.abs(bright - 255.0 * np.clip(truth, 0.0, 1.0)).max() <= 1.0
+    assert desk.document is before, "a look is no step of undo"
+    panel.look.fields["proxy"].enter("quarter")
+    assert desk.workspace.plate_look.words() == "exposure +2.0 stops · quarter proxy"
+    click(hand, START)
+    hand.window.commands.run("match.forward")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    (track,) = desk.document.tracks
+    truth = track.points[0] + STEP * np.arange(COUNT)[:, None]
+    assert np.abs(track.points - truth).max() < 0.1, "tracking sees every pixel"
+    project = tmp_path / "looked.filo"
+    desk.session.save(project)
+    panel.look.fields["exposure"].enter(0.0)
+    hand.window.opening.open(project)
+    hand.until(lambda: desk.session.path == project)
+    hand.rest()
+    assert (desk.workspace.plate_look.exposure, desk.workspace.plate_look.proxy) == (2.0, "quarter")
+    assert (panel.look.fields["exposure"].value(), panel.look.fields["proxy"].value()) == (2.0, "quarter")
