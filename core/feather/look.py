@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.feather.attributes import column
-from core.feather.levels import feather_mesh
+from core.feather.levels import flat_feather
 
 Color = tuple[float, float, float]
 
@@ -25,8 +25,7 @@ class FeatherLook(NamedTuple):
 
 def look_of(values: NDArray[np.float32]) -> FeatherLook:
     """The look of a feather, (K,) all its attributes: its colours by how much of the light each of them stops."""
-    card = feather_mesh(values, 0, "card").picture
-    assert card is not None
+    card = flat_feather(values).picture
     encoded, cover = card[..., :3].astype(np.float64) / 255.0, card[..., 3:].astype(np.float64)
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     red, green, blue = (linear * cover).sum(axis=(0, 1)) / max(float(cover.sum()), 1e-9)

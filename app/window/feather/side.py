@@ -342,13 +342,11 @@ class FeatherSide(QWidget):
 def made(values: NDArray[np.float32], level: str, other: NDArray[np.float32] | None) -> Shown:
     """A feather as the editor shows it; for a job."""
     from core.feather.compare import compare
-    from core.feather.levels import LEVELS, feather_mesh
+    from core.feather.levels import LEVELS, feather_mesh, flat_feather
     from core.feather.outline import outline_of
 
-    card = feather_mesh(values, 0, "card")
-    assert card.picture is not None
-    flat = FlatFeather(card.picture, card.corner, card.extent, (outline_of(values, 0), outline_of(values, 1)))
-    solid = card if level == "card" else feather_mesh(values, 0, next(known for known in LEVELS if known == level))
+    flat = FlatFeather(*flat_feather(values), (outline_of(values, 0), outline_of(values, 1)))
+    solid = feather_mesh(values, 0, next(known for known in LEVELS if known == level))
     if other is None:
         return Shown(flat, solid, None, "")
     found = compare(values, other)

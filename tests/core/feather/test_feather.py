@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import functools
-
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from core.feather.attributes import COLUMNS, NAMES, SHAPE_NAMES, defaults, limits
 from core.feather.barbs import Barbs, condense, expand
 from core.feather.compare import compare
-from core.feather.levels import Level, feather_mesh, vane_patches
+from core.feather.levels import feather_mesh, vane_patches
 from core.feather.nurbs import Nurbs, evaluate, through
-from core.feather.pieces import FeatherMesh
 from core.feather.presets import preset_values
 from core.feather.shaft import CIRCLE_KNOTS, CORNERS, WEIGHTS
 from core.feather.simplify import kept_of_line
@@ -120,35 +115,6 @@ def test_simplified_lines_stay_within_their_tolerance() -> None:
     kept = line[kept_of_line(line, 0.01)]
     assert 5 < len(kept) < 60
     assert np.abs(np.interp(at, kept[:, 0], kept[:, 1]) - line[:, 1]).max() < 0.01 * np.sqrt(2.0) + 1e-9
-
-
-@functools.cache
-def _mesh(preset: str, level: Level) -> FeatherMesh:
-    return feather_mesh(preset_values(preset), 5, level)
-
-
-def _silhouette(preset: str, level: Level, turn: float) -> NDArray[np.uint8]:
-    """The shadow of a feather, 500 pixels to its length, turned about its shaft; slits of 1 % are closed."""
-    mesh = _mesh(preset, level)
-    length = float(preset_values(preset)[COLUMNS["shaftLength"]])
-    points = mesh.points.astype(np.float64) / length
-    xy = np.stack([points[:, 0] * np.cos(turn) + points[:, 2] * np.sin(turn), points[:, 1]], axis=1)
-    out = np.zeros((800, 800), np.uint8)
-    pixels = np.round((xy * 500.0 + [400.0, 120.0]) * 16.0).astype(np.int32)
-    for triangle in mesh.triangles:
-        cv2.fillConvexPoly(out, pixels[triangle], 255, shift=4)
-    return np.asarray(cv2.morphologyEx(out, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)))
-
-
-@pytest.mark.parametrize("preset", ["goldfinch-rectrix"])
-@pytest.mark.parametrize(("coarse", "fine"), [("vane", "barbs")])
-def test_a_level_keeps_to_the_silhouette_of_the_finer_one(preset: str, coarse: Level, fine: Level) -> None:
-    outlines = []
-    for level in (coarse, fine):
-        found, _ = cv2.findContours(_silhouette(preset, level, 0.5), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        outlines.append(max(found, key=len)[:, 0] / 500.0)
-    apart = [cKDTree(outlines[1 - k]).query(outlines[k])[0] for k in (0, 1)]
-    assert max(np.percentile(a, 98) for a in apart) <= 0.01
 
 
 def test_odd_feathers_are_made_without_a_number_that_is_none() -> None:

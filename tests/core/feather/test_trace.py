@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.feather.attributes import COLUMNS
-from core.feather.levels import feather_mesh
+from core.feather.levels import flat_feather
 from core.feather.outline import outline_of
 from core.feather.presets import preset_values
 from core.feather.trace import traced
@@ -19,8 +19,7 @@ NO_DOWN = [COLUMNS["downHairDensityVaneLeft"], COLUMNS["downHairDensityVaneRight
 
 def photograph(values: NDArray[np.float32], turn: float) -> NDArray[np.uint8]:
     """The feather flat on a blue ground, turned by degrees."""
-    card = feather_mesh(values, 0, "card").picture
-    assert card is not None
+    card = flat_feather(values).picture
     wide = np.zeros((900, 900, 4), np.uint8)
     high, across = card.shape[:2]
     top, left = (900 - high) // 2, (900 - across) // 2
