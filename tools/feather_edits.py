@@ -23,6 +23,7 @@ from core.feather.coat.drawn import (
 from core.feather.coat.dress import KEYS, Dressed, dress_feathers
 from core.feather.coat.plumage import Plumage
 from core.feather.coat.proxy import demoted, keyed, promoted
+from core.feather.coat.wing import WING_IDS
 from core.feather.coat.worn import for_all, worn_preset
 from core.feather.presets import preset_values
 from core.groom.groom import Groom
@@ -239,6 +240,8 @@ def promote_feather(document: Document, coat_id: int, feather: int, plumage: Plu
     plumage : what shows the coat; nothing is laid anew when it has.
     """
     coat = _free(document, coat_id)
+    if feather >= WING_IDS:
+        raise UserError("This feather is of a wing: choose its row and number under Wings in the feather panel.")
     mesh, keys = find_mesh(document, coat.mesh_id).mesh, keys_of(document, coat)
     laid = plumage.at_rest(coat, keys, mesh, float(document.first_frame))
     rows = np.flatnonzero(laid.ids == feather)

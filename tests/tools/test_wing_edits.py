@@ -9,8 +9,10 @@ from core.demo.bird_document import bare_bird_document
 from core.document import Document
 from core.errors import UserError
 from core.evaluator import Evaluator
+from core.feather.coat.plumage import Plumage
+from core.feather.coat.wing import first_id
 from core.value import constant
-from tools.feather_edits import add_feathers, set_feathers
+from tools.feather_edits import add_feathers, promote_feather, set_feathers
 from tools.keyed import keyed_values
 from tools.wing_edits import (
     add_wings,
@@ -79,3 +81,9 @@ def test_what_is_keyed_on_a_wing_is_found_with_the_other_curves(document: Docume
     fan = Value(base=Curve(keys=(Key(frame=1001.0, value=0.5), Key(frame=1010.0, value=1.0))))
     found = keyed_values(set_wing(document, coat.id, 2, fan=fan))
     assert [one.address for one in found] == [f"feathers/{coat.id}/wings/2/fan"]
+
+
+def test_a_feather_of_a_wing_is_no_proxy(document: Document) -> None:
+    coat = document.feathers[0]
+    with pytest.raises(UserError, match="under Wings"):
+        promote_feather(document, coat.id, first_id(coat.wings[0], coat.wings[0].rows[0]), Plumage(Evaluator()), 1001.0)

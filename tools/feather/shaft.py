@@ -12,6 +12,7 @@ from core.feather.coat.coat import FeatherCoat, Proxy
 from core.feather.coat.pick import FeatherHit, feather_under
 from core.feather.coat.plumages import Lying
 from core.feather.coat.proxy import demoted, keyed, promoted, shaft_at
+from core.feather.coat.wing import WING_IDS
 from core.field import field
 from core.overlay import Circle, Label, Marker, Overlay, Overlays, Polyline
 from core.record import Record
@@ -177,6 +178,8 @@ class Shaft(Tool[ShaftParams]):
             if ground.mirrored:
                 return Beside()
             raise UserError("There is no feather here; press on the one to take by hand.")
+        if hit.id >= WING_IDS:
+            raise UserError("This feather is of a wing: choose its row and number under Wings in the feather panel.")
         if self.params.how != "give back":
             return HoldShaft(self.params, ground, pointer, lying, hit)
         if proxy_of(ground.coat, hit.id) is None and not ground.mirrored:

@@ -64,6 +64,7 @@ class Plumages:
         """The coat on `skin`, the mesh as posed at `frame`; see :meth:`Plumage.at_frame`. Called on any thread."""
         from core.feather.coat.layering import crossings
         from core.feather.coat.plumage import Plumage
+        from core.feather.coat.wing import WING_IDS
 
         with self._lock:
             lock, plumage = self._kept.setdefault(coat.id, (Lock(), Plumage(self._evaluator)))
@@ -73,6 +74,7 @@ class Plumages:
             frames = plumage.root_frames(coat, keys, mesh)
             posed = frames if skin.points is mesh.points else plumage.root_frames(coat, keys, mesh, skin)
             left = crossings(laid.layered, skin.bvh, self._evaluator.workers)
+            left = left._replace(skin=left.skin[laid.ids[left.skin] < WING_IDS])  # quills of wings stand in the skin
         lying = Lying(coat, keys, mesh, skin.points, frame, rest, laid, frames, posed, left)
         with self._lock:
             if coat.id in self._kept:
