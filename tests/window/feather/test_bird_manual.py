@@ -19,7 +19,7 @@ def test_the_chapter_is_that_of_the_steps() -> None:
         assert (DOCS / "pictures" / picture_of(number)).is_file()
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(500)
 def test_the_goldfinch_followed_literally(home: Path, qapp: object) -> None:
     if OFFSCREEN is not None:
         pytest.skip(OFFSCREEN)
