@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from core.errors import UserError
 from core.match.lens import model_named
-from core.match.solve.bundle import POSE, TURN, Free, adjust
+from core.match.solve.bundle import MOST_DAMPING, POSE, TURN, Free, adjust
 from core.match.solve.first import Cameras, Grower, best_pairs, keyframes, rays, triangulated
 from core.match.solve.floor import noise_floor
 from core.match.solve.nodal import solve_nodal
@@ -285,7 +285,7 @@ class Problem:
             tolerance=1e-6 if start.zoom else 1e-4,
             least_damping=least,
             iterations=ZOOM_STEPS if start.zoom else 20,
-            settled=SETTLED,
+            settled=SETTLED if start.zoom else MOST_DAMPING,
         ).state
         sliders = np.zeros(self.tracks, bool)
         for k in range(ROUNDS_OUT):
@@ -315,7 +315,7 @@ class Problem:
                 tolerance=1e-8 if start.zoom else 1e-6,
                 least_damping=least,
                 iterations=ZOOM_STEPS if start.zoom else 30,
-                settled=SETTLED,
+                settled=SETTLED if start.zoom else MOST_DAMPING,
             ).state
         of_frame = np.bincount(observations.frame[used], minlength=count)
         seen_there = np.bincount(observations.frame, minlength=count)
