@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from app.deliver import posed_document
 from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat, Placement
 from core.feather.coat.dress import dress_feathers
@@ -20,6 +21,7 @@ from core.feather.coat.plumage import Plumage
 from core.feather.coat.posing import LENGTH
 from core.feather.coat.proxy import demoted, promoted
 from core.feather.look import FeatherLook
+from core.formats import rig_file
 from core.formats.mesh_file import read_mesh
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.groom.groom import Groom
@@ -31,6 +33,8 @@ from tests.core.feather.coat.bodies import egg
 
 TITLE = "Feathers: 10,000 from 20 keys"
 COUNT, KEYS = 10_000, 20
+CLIPS = {"parrot": "animation/bird_morph_parrot/Parrot.glb", "fox": "animation/fox_gltf/animated/Fox.glb"}
+SMOOTH = 0.05  # frames of a clip between the poses of a smooth motion
 ANIMALS = {"penguin": "meshes/odedstein_A/penguin/penguin.obj", "parrot": "animation/bird_morph_parrot/Parrot.glb"}
 
 
@@ -40,8 +44,37 @@ def run() -> list[Row]:
     root = os.environ.get("FILOPLUME_DATA")
     for name, path in ANIMALS.items() if root else ():
         rows += _animal(name, read_mesh(Path(str(root)) / path).mesh, evaluator)
+    for name, path in CLIPS.items() if root else ():
+        rows += _clip(name, Path(str(root)) / path, evaluator)
     evaluator.close()
     return rows
+
+
+def _clip(name: str, path: Path, evaluator: Evaluator) -> list[Row]:
+    """An animal in motion: what crosses in frames of its clip, and which feathers jump when it moves smoothly."""
+    document = rig_file.document_of(rig_file.read_rig(path))
+    item, first, last = document.meshes[0], document.first_frame, document.last_frame
+    coat, keys = dress_feathers(item.mesh, evaluator, COUNT)
+    plumage = Plumage(evaluator)
+    lengths = plumage.at_rest(coat.replace(layered=False), keys, item.mesh).layered.poses[:, LENGTH, None, None, None]
+    most, skin_hits, jumping = 0.0, 0, 0
+    for frame in np.linspace(first, last, 7)[:-1] + 0.25:
+        seen = []
+        for step in range(3):
+            skin = posed_document(document, float(frame + step * SMOOTH), evaluator)[item.id]
+            laid = plumage.at_frame(coat, keys, item.mesh, skin, float(first), float(first))
+            frames = plumage.root_frames(coat, keys, item.mesh, skin).astype(np.float64)
+            away = laid.layered.vanes.astype(np.float64) - laid.feathers.roots[:, None, None]
+            seen.append(np.einsum("nij,nrcj->nrci", frames, away) / lengths)
+        told = crossings(laid.layered, skin.bvh, evaluator.workers)
+        most, skin_hits = max(most, 100.0 * len(told.first) / told.pairs), max(skin_hits, len(told.skin))
+        jumps = np.linalg.norm(seen[0] - 2.0 * seen[1] + seen[2], axis=-1).max(axis=(1, 2))
+        jumping = max(jumping, int((jumps > 0.02).sum()))
+    return [
+        Row(f"{name} in motion: pairs that cross, the worst of 6 frames", most, "%", 1.0),
+        Row(f"{name} in motion: feathers in the skin", float(skin_hits), "", 0.0),
+        Row(f"{name} in motion: feathers of {COUNT:,} that jump by over 2 %", float(jumping), "", 0.0),
+    ]
 
 
 def _placing(evaluator: Evaluator) -> list[Row]:

@@ -34,6 +34,7 @@ from core.feather.coat.frames import carried, field_frames, key_frames
 from core.feather.coat.ground import smoothed
 from core.feather.coat.keys import attributes_of_keys, interpolate, key_shapes
 from core.feather.coat.layering import Feathers, Layered, layer, layer_again
+from core.feather.coat.nearing import clearances, drawn_from_skin
 from core.feather.coat.order import growth_order, roll_sides
 from core.feather.coat.place import place_feathers
 from core.feather.coat.posing import LENGTH, pose_vanes
@@ -50,6 +51,7 @@ from core.mesh.mesh import Mesh
 from core.mesh.skin import Skin, skin_at_rest
 from core.random import rand
 from core.value import Formula, Value, evaluate_within, names_used
+from core.workers import Workers
 
 STANDING = 0.28  # radians, lift of feathers without keys
 SIZED = ("shaftLength", "vaneWidthLeft", "vaneWidthRight")  # what length and width of the coat act on
@@ -109,6 +111,8 @@ class Plumage:
             poses = base.poses + (settled - resting.poses)
             poses[:, LENGTH] = base.poses[:, LENGTH] * settled[:, LENGTH] / resting.poses[:, LENGTH]
             if coat.layered:
+                clear = _clear(base.feathers, poses, skin, workers)
+                poses[:, LENGTH] *= drawn_from_skin(base.feathers.own, self._clearances(rest), clear)
                 layered = layer(base.feathers, poses, bed.ground.near, skin.bvh, workers, at_rest=False)
             else:
                 layered = _unlayered(base.feathers, poses, workers.ranges)
@@ -116,6 +120,13 @@ class Plumage:
             frames = self.root_frames(coat, keys, mesh, skin)
             layered = apply_proxies(coat, rest.ids, base.feathers, frames, layered, frame, skin.bvh, workers)
         return self._winged(coat, mesh, self._laid(coat, bed, layered, base, skin, frame), frame)
+
+    def _clearances(self, rest: Laid) -> NDArray[np.float32]:
+        """How far the skin lies off the feathers at rest."""
+        laid, workers = rest.layered, self._evaluator.workers
+        known: NDArray[np.float32] = self._remember(
+            "clearances", lambda: clearances(laid.vanes, laid.poses[:, LENGTH], rest.skin, workers), laid, rest.skin)
+        return known
 
     def bed(self, coat: FeatherCoat, keys: Groom | None, mesh: Mesh) -> Bed:
         """Where the feathers of a coat stand."""
@@ -350,6 +361,13 @@ class Plumage:
         )
         shown = rand(bed.places.ids, seed_of(coat) + 401) < density
         return Laid(bed.places.ids, shown, layered, base.feathers, bed, skin, base.fields)
+
+
+def _clear(
+    feathers: Feathers, poses: NDArray[np.float64], skin: Skin, workers: Workers
+) -> NDArray[np.float32]:
+    vanes = pose_vanes(feathers.own, poses, feathers.roots, feathers.frames, ranges=workers.ranges)
+    return clearances(vanes, poses[:, LENGTH], skin, workers)
 
 
 def _same(a: Any, b: Any) -> bool:
