@@ -34,6 +34,7 @@ GIVE = float(np.radians(1.35))  # moves no point of a vane by more than 1 % of i
 GIVE_STEPS = 4
 SKIN_LIFT = float(np.radians(2.5))  # a step out of the skin, as many as SKIN_STEPS; then as many that shrink
 SKIN_STEPS = 12
+GONE = 1e-6  # of its length: what is left of a feather whose root lies in a fold of the skin
 
 
 @njit(cache=True, nogil=True)
@@ -90,7 +91,7 @@ def _out_of_skin(  # type: ignore[no-untyped-def]
     way, base, own_vane, root, frame, nodes, children, corners, bent_back, trial, vane, own, stack, s, t
 ):
     """Pose a feather `way` steps along its way out of the skin, first lifted, then shrunk; True when it is clear."""
-    shrunk = max(1.0 - max(way - SKIN_STEPS, 0.0) / SKIN_STEPS, LENGTHS[-1])
+    shrunk = max(1.0 - max(way - SKIN_STEPS, 0.0) / SKIN_STEPS, GONE)
     _changed(base, min(way, SKIN_STEPS) * SKIN_LIFT, 0.0, shrunk, bent_back, trial)
     pose_vane(own_vane, trial, root, frame, vane)
     strip_boxes(vane, own)
