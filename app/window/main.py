@@ -40,6 +40,7 @@ from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
 from app.window.match.model_panel import ModelPanel
+from app.window.match.plate_beside import PlateBeside
 from app.window.match.plate_panel import PlatePanel
 from app.window.match.solve_panel import SolvePanel
 from app.window.match.solve_space import SolveSpace
@@ -77,7 +78,7 @@ from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
-AROUND = ("shelf", "timeline", "curves", "pose_map", "feather", "space")  # panels that are not in the column
+AROUND = ("shelf", "timeline", "curves", "pose_map", "feather", "space", "beside")  # panels that are not in the column
 COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
 
 
@@ -123,9 +124,11 @@ class MainWindow(QMainWindow):
         self.feather_side = FeatherSide(self.desk, self.viewport.draw_beside, FoldMemory(self._folder))
         self.solve_space = SolveSpace(
             self.desk, lambda: self.hotkeys.keymap, lambda: self.viewport.eye.trackball, self.match.screen)
+        self.plate_beside = PlateBeside(self.desk)
+        self.plate_beside.set_budget(settings.frames_mb << 20)
         self.panels: dict[str, QWidget] = {
             "shelf": self.shelf, "timeline": self.timeline, "curves": self.curves, "pose_map": self.pose_side,
-            "feather": self.feather_side, "space": self.solve_space}
+            "feather": self.feather_side, "space": self.solve_space, "beside": self.plate_beside}
         self.column = self._make_column()
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
@@ -178,7 +181,9 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
-        self.sides = BesideView(BesideView(BesideView(self.view, self.pose_side), self.feather_side), self.solve_space)
+        self.sides: QWidget = self.view
+        for side in (self.pose_side, self.feather_side, self.solve_space, self.plate_beside):
+            self.sides = BesideView(self.sides, side)
         self.middle.addWidget(self.sides)
         self.middle.addWidget(self.doors)
         self.split.addWidget(self.middle)
@@ -412,6 +417,7 @@ class MainWindow(QMainWindow):
         self.desk.session.history.budget = new.history_mb << 20
         self.viewport.set_budget(new.density_ms)
         self.match.screen.set_budget(new.frames_mb << 20)
+        self.plate_beside.set_budget(new.frames_mb << 20)
         self._use_pen()
         if self._preferences is not None:
             self._preferences.refresh()
@@ -554,6 +560,7 @@ class MainWindow(QMainWindow):
         self._keeper.close()
         self.viewport.release_gl()
         self.viewport.plate.close()
+        self.plate_beside.close_frames()
         self.desk.session.changed = None
         self.desk.session.close(discard=not self._keeps_place)
         self.crash_watch.close()
