@@ -76,7 +76,7 @@ class PlateBeside(QWidget):
     def refresh(self) -> None:
         """Offer what there is beside the plate in view."""
         offered = choices(self._desk.document, round(self._desk.workspace.frame))
-        names = {choice: words for choice, words in offered}
+        names = dict(offered)
         kept = self.sheet.choice if self.sheet.choice in names else next(iter(names), None)
         self.which.set_choices(tuple(names) or (None,), tuple(names.values()) or ("nothing",))
         self.which.set_value(kept)
