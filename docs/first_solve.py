@@ -218,8 +218,9 @@ STEPS = (
          ("Track point",) * (len(MARKS) + 1) + ("Track both ways",)),
     Step("Solve the camera",
          "In the panel **Solve** type the focal length if you know it (1000 px here; at 0 it is found) and press "
-         "*Solve camera*. It works in the background. The panel says whether the camera holds, how large the errors "
-         "are, and on which frames; crosses in the plate are where the solve puts the points.",
+         "*Solve camera*. It works in the background; Cancel ends it at once and leaves the camera as it was. The "
+         "panel says whether the camera holds, how large the errors are, and on which frames; crosses in the plate "
+         "are where the solve puts the points.",
          begins, ("Solve camera",)),
     Step("See what did not fit",
          "The table has the worst tracks and frames first, with their share of the error, how sure each point is, and "

@@ -50,7 +50,7 @@ def solved_camera(
         settings.lens if bent else "brown",
     )
     found = solve(observations, frames, len(tracks), plate_size(plate), options, progress)
-    told = report(found, names)
+    told = report(found, names, progress=progress)
     shot = shot_of(found, names)
     held, known = np.flatnonzero(found.held), np.flatnonzero(found.known)
     advice = [

@@ -69,12 +69,13 @@ class SolveJob(QObject):
         def work(progress: Progress, cancelled: Asked) -> SolvedCamera:
             said = 0
 
-            def words(_: str) -> None:
+            def words(said_now: str) -> None:
                 nonlocal said
                 if cancelled():
                     raise Cancelled
-                said += 1
-                progress(min(0.95, said / STAGES))
+                if said_now:
+                    said += 1
+                    progress(min(0.95, said / STAGES))
 
             return solved_camera(plate, tracks, settings, words)
 

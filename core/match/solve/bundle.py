@@ -6,6 +6,7 @@ The blocks of the larger side, points or frames, are eliminated; what is kept is
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -131,6 +132,7 @@ def adjust(
     damping: float = 1e-4,
     least_damping: float = LEAST_DAMPING,
     settled: float = MOST_DAMPING,
+    progress: Callable[[str], None] = lambda words: None,
 ) -> Adjusted:
     """Move what is free to where the (robust) squares of the whitened residuals are least.
 
@@ -139,12 +141,16 @@ def adjust(
     least_damping : above 0 where something cannot be told, as the distance of points seen by a camera that only turns.
     settled : it ends at no greater damping than this, which would hold what is told weakly where it began: a zoom of a
         long lens against the way ahead.
+    progress : called without words around every step; what it raises ends the adjustment.
     """
+    progress("")
     normal = normal_equations(state, observations, scale, free)
     tried = 0
     while tried < iterations and damping < MOST_DAMPING:
         tried += 1
+        progress("")
         moved = _moved(state, _step(normal, observations, free, damping), free)
+        progress("")
         if moved is not None:
             after = normal_equations(moved, observations, scale, free)
             if after.cost < normal.cost:

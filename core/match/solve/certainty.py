@@ -6,6 +6,7 @@ stay small when a wrong focal length bends the path.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -216,7 +217,10 @@ class Certainty:
         centres = self._state.centres()
         return _after_similarity(centres - np.einsum("fji,fj->fi", self._state.rotation, shift), centres)
 
-    def fixes(self, rms: float, by_frame: Array, by_track: Array, path: float) -> tuple[Fix, ...]:
+    def fixes(
+        self, rms: float, by_frame: Array, by_track: Array, path: float,
+        progress: Callable[[str], None] = lambda words: None,
+    ) -> tuple[Fix, ...]:
         """What the rest would be without each of the worst tracks and frames: one Gauss-Newton step from here.
 
         (Belsley, Kuh and Welsch, "Regression Diagnostics", 1980, deletion of a group of rows, with the matrix of all.)
@@ -226,7 +230,10 @@ class Certainty:
         cost = np.square(residuals(self._state, self._part)).sum(axis=1)
         tried = [("track", int(row)) for row in _worst(by_track) if row in self._held]
         tried += [("frame", int(row)) for row in _worst(by_frame)]
-        made = [self._without(kind, row, rms, cost, path) for kind, row in tried]
+        made = []
+        for kind, row in tried:
+            progress("")
+            made.append(self._without(kind, row, rms, cost, path))
         return tuple(sorted((fix for fix in made if fix is not None), key=lambda fix: fix.rms_px))
 
     def _without(self, kind: str, row: int, rms: float, cost: Array, path: float) -> Fix | None:

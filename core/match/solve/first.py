@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import cv2
@@ -58,12 +58,15 @@ def keyframes(observations: Observations, frames: int, tracks: int, most: int = 
         count = min(frames, MOST_KEYS, count + count // 2 + 1)
 
 
-def best_pairs(table: Array, noise: float) -> list[Pair]:
+def best_pairs(
+    table: Array, noise: float, progress: Callable[[str], None] = lambda words: None,
+) -> list[Pair]:
     """Pairs of keyframes by the parallax that no turn explains, the number of tracks and how they are spread."""
     frames = len(table)
     width = np.nanmax(np.abs(table)) if np.isfinite(table).any() else 1.0
     found = []
     for i in range(frames):
+        progress("")
         for j in range(i + 1, frames):
             both = np.isfinite(table[i, :, 0]) & np.isfinite(table[j, :, 0])
             count = int(both.sum())
@@ -156,19 +159,25 @@ class Grower:
     """Finds all keyframes from a pair.
 
     table : (F, P, 2) places over depth of the keyframes. noise : their standard deviation.
+    progress : as :func:`solve` has it.
     """
 
-    def __init__(self, observations: Observations, lens: Array, table: Array, noise: float, scale: float) -> None:
+    def __init__(
+        self, observations: Observations, lens: Array, table: Array, noise: float, scale: float,
+        progress: Callable[[str], None] = lambda words: None,
+    ) -> None:
         self._observations, self._lens, self._table = observations, lens, table
-        self._noise, self._scale = noise, scale
+        self._noise, self._scale, self._progress = noise, scale, progress
 
     def hypotheses(self, pairs: list[Pair]) -> list[tuple[float, Cameras]]:
         """What the pairs could mean, the likeliest first: by how well other keyframes are explained by it."""
         found = []
         for pair in pairs:
+            self._progress("")
             both = np.isfinite(self._table[[pair.first, pair.second], :, 0]).all(axis=0)
             a, b = (np.ascontiguousarray(self._table[k, both]) for k in (pair.first, pair.second))
             for rotation, shift in _relative(a, b, self._noise):
+                self._progress("")
                 cameras = self._pair(pair, rotation, shift)
                 if cameras.held.sum() >= max(FEWEST_POINTS, 0.6 * both.sum()):
                     found.append((self._doubt(cameras), cameras))
@@ -202,6 +211,7 @@ class Grower:
         picked = others[np.linspace(0, len(others) - 1, min(TESTED, len(others))).astype(int)]
         doubts = []
         for k in np.unique(picked):
+            self._progress("")
             flat, points = self._table[k, seen[k]], cameras.state.points[seen[k]]
             pose = (
                 (cameras.state.rotation[k], cameras.state.translation[k])
@@ -227,6 +237,7 @@ class Grower:
             k = int(counts.argmax())
             if counts[k] < FEWEST_POINTS:
                 break
+            self._progress("")
             pose = pose_from_points(cameras.state.points[seen[k]], self._table[k, seen[k]], self._noise)
             if pose is None:
                 failed[k] = True
@@ -256,7 +267,7 @@ class Grower:
         free = Free(frame=(*POSE, FRAME_FOCAL) if zoom is not None else POSE, lens=lens_columns, zoom=zoom)
         done = adjust(
             small, part, free, scale=2.5 * max(self._scale, min(spread, 20.0 * self._scale)), iterations=15,
-            tolerance=1e-4,
+            tolerance=1e-4, progress=self._progress,
         ).state
         rotation, translation, focal = state.rotation.copy(), state.translation.copy(), state.focal.copy()
         rotation[frames], translation[frames], focal[frames] = done.rotation, done.translation, done.focal

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from core.match.solve.bundle import POSE, TURN, Adjusted, Free, adjust
@@ -42,11 +44,13 @@ def solve_nodal(
     scale: float,
     lens_columns: tuple[int, ...] = (),
     zoom: Array | None = None,
+    progress: Callable[[str], None] = lambda words: None,
 ) -> Adjusted | None:
     """Rotations of all frames with every track at distance 1; None when the frames hang together by too few tracks.
 
     noise : pixels. scale : of the robust loss, in whitened units.
     lens_columns : what of the lens is free. zoom : smoothness of the frames' own focal lengths, when they are free.
+    progress : as :func:`solve` has it.
     """
     unit = bearings(lens, 0.0, observations.xy)
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
@@ -74,6 +78,7 @@ def solve_nodal(
         least_damping=DISTANCE,
         iterations=12,
         tolerance=1e-3,
+        progress=progress,
     )
 
 

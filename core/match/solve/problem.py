@@ -173,6 +173,7 @@ class Problem:
                 scale=2.5 * self.noise,
                 lens_columns=columns,
                 zoom=self._tied(rows, zoom=zoom),
+                progress=self.progress,
             )
             if done is None:
                 continue
@@ -215,8 +216,8 @@ class Problem:
         self.progress("looking for the first pair of frames")
         table = rays(self.part, lens, len(self.keys), self.tracks)
         noise = self.pixels / float(np.exp(lens[FOCAL]))
-        grower = Grower(self.part, lens, table, noise, self.noise)
-        pairs = best_pairs(table, noise)
+        grower = Grower(self.part, lens, table, noise, self.noise, self.progress)
+        pairs = best_pairs(table, noise, self.progress)
         best: Start | None = None
         for _, start in grower.hypotheses(pairs)[:HYPOTHESES]:
             self.progress("finding the keyframes")
@@ -286,6 +287,7 @@ class Problem:
             least_damping=least,
             iterations=ZOOM_STEPS if start.zoom else 20,
             settled=SETTLED if start.zoom else MOST_DAMPING,
+            progress=self.progress,
         ).state
         sliders = np.zeros(self.tracks, bool)
         for k in range(ROUNDS_OUT):
@@ -316,6 +318,7 @@ class Problem:
                 least_damping=least,
                 iterations=ZOOM_STEPS if start.zoom else 30,
                 settled=SETTLED if start.zoom else MOST_DAMPING,
+                progress=self.progress,
             ).state
         of_frame = np.bincount(observations.frame[used], minlength=count)
         seen_there = np.bincount(observations.frame, minlength=count)
@@ -359,7 +362,9 @@ class Problem:
         known = reach.copy()
         for _ in range(2):  # frames beyond the keyframes follow from their neighbours
             rows = self.observations.take(held[self.observations.track] & reach[self.observations.frame])
-            state = adjust(state, rows, Free(frame=columns, points=False), scale=scale, tolerance=1e-3).state
+            state = adjust(
+                state, rows, Free(frame=columns, points=False), scale=scale, tolerance=1e-3, progress=self.progress,
+            ).state
             known[:] = np.bincount(rows.frame, minlength=count) >= 4
             if nodal:
                 break

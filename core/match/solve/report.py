@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -56,8 +56,13 @@ class Report(NamedTuple):
     fixes: tuple[Fix, ...]
 
 
-def report(solution: Solution, names: list[str], said: Sequence[str] | None = None) -> Report:
+def report(
+    solution: Solution, names: list[str], said: Sequence[str] | None = None,
+    progress: Callable[[str], None] = lambda words: None,
+) -> Report:
     """Judge a solve; `names` of its tracks, `said` what its frames are called, their numbers otherwise.
+
+    progress : called without words many times; what it raises ends the judging.
 
     Raises
     ------
@@ -87,17 +92,22 @@ def report(solution: Solution, names: list[str], said: Sequence[str] | None = No
             f"{round(100 * out)} % of the tracks do not fit the camera of the others: there may be two motions. Take "
             "out the tracks of what moves by itself."
         )
+    progress("")
     certain = Certainty(solution)
+    progress("")
     kind = solution.kind
     if kind == "free" and certain.flat():
         kind = "planar"
+    progress("")
     path = certain.path()
+    progress("")
     if path > NO_PATH:
         raise UserError(
             "The path cannot be told from these tracks: the camera moves too little against the distance of the "
             "points. Solve it as one that only turns (--nodal), or add tracks that are near."
         )
     tests = certain.tests()
+    progress("")
     if kind == "nodal":
         gain = parallax(state, part, solution.sigma)
         tests = (*tests, Test(TRANSLATION, gain if gain > BY_CHANCE else 0.0, 0.0))
@@ -106,7 +116,8 @@ def report(solution: Solution, names: list[str], said: Sequence[str] | None = No
     warnings = [*solution.said, *_warnings(solution, noisy, out, path, sigma_f, tests), *moves]
     typical = float(np.median(focal[solution.known & (solution.views.camera == 0)]))
     rms = float(np.sqrt((length**2).mean()))
-    fixes = tuple(fix for fix in certain.fixes(rms, by_frame, by_track, path) if fix.rms_px < rms or fix.share > MOVES)
+    fixes = certain.fixes(rms, by_frame, by_track, path, progress)
+    fixes = tuple(fix for fix in fixes if fix.rms_px < rms or fix.share > MOVES)
     return Report(
         rms,
         float(np.median(length)),

@@ -37,6 +37,7 @@ def solve(
     """Cameras and points from observations of `tracks` tracks in frames (F,) of `size` pixels.
 
     views : who took which frame, where it is not one shot; its first camera is the one `size` and `options` tell of.
+    progress : told what is begun, and called without words many times between; what it raises ends the solve.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import cv2
@@ -20,22 +21,22 @@ from tests.core.match.solve.shots import SIZE, shot
 from tests.window.conftest import Opened
 
 
-def tracked(folder: Path) -> Document:
+def tracked(folder: Path, tracks: int = 30, frames: int = 16) -> Document:
     """A plate of grey frames with tracks of a shot; one of them slides away."""
-    made = shot("orbit", 30, 16, seed=1)
-    rows, tracks = made.observations, []
-    for k in range(30):
+    made = shot("orbit", tracks, frames, seed=1)
+    rows, found = made.observations, []
+    for k in range(tracks):
         own = rows.track == k
         xy = rows.xy[own] + (np.linspace(0, 40, own.sum())[:, None] if k == 7 else 0.0)
         table = np.column_stack([made.frames[rows.frame[own]], xy])
         track: Track = keyed_track(k + 1, f"point {k + 1}", table, 1)
-        tracks.append(track.replace(covariance=freeze(np.tile([0.09, 0.0, 0.09], (own.sum(), 1)))))
+        found.append(track.replace(covariance=freeze(np.tile([0.09, 0.0, 0.09], (own.sum(), 1)))))
     grey = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
     for frame in made.frames:
         cv2.imwrite(str(folder / f"grey.{frame}.jpg"), grey)
-    plate = Plate(id=1, name="grey", path=str(folder / "grey.####.jpg"), first=1001, last=1016, width=SIZE[0],
+    plate = Plate(id=1, name="grey", path=str(folder / "grey.####.jpg"), first=1001, last=1000 + frames, width=SIZE[0],
                   height=SIZE[1])
-    return Document(plates=(plate,), tracks=tuple(tracks), first_frame=1001, last_frame=1016)
+    return Document(plates=(plate,), tracks=tuple(found), first_frame=1001, last_frame=1000 + frames)
 
 
 def test_a_camera_is_solved_judged_and_given_away(opened: Opened, tmp_path: Path) -> None:
@@ -96,3 +97,22 @@ def test_too_few_tracks_are_refused_in_words(opened: Opened, tmp_path: Path) -> 
     hand.until(lambda: not hand.window.desk.jobs.running, 60_000)
     assert not hand.window.desk.document.solves
     assert "needs 8" in str(errors[0])
+
+
+def test_a_cancelled_solve_ends_soon_and_leaves_all_as_it_was(opened: Opened, tmp_path: Path) -> None:
+    hand = opened(tracked(tmp_path, 200, 100))
+    desk = hand.window.desk
+    desk.set_craft("match")
+    before = desk.document
+    for patience in (0.05, 0.2, 0.4):  # into its search, and into what it adjusts
+        hand.window.commands.run("match.solve")
+        job = next(one for one in desk.jobs.running if one.name == "Solve camera")
+        assert job.thread is not None
+        time.sleep(patience)
+        began = time.monotonic()
+        desk.jobs.cancel(job)
+        job.thread.join(5.0)
+        assert not job.thread.is_alive()
+        assert time.monotonic() - began < 1.0, patience  # 0.1 s on a machine that does nothing else
+        hand.until(lambda: not desk.jobs.running, 5_000)
+    assert desk.document is before
