@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.document import Document, visible_grooms
 from core.feather.pieces import FeatherMesh
-from core.groom.children import Children, Traits
 from core.groom.groom import Coat as CoatRecord
 from core.groom.strands import GroomStrands, Strands
 from core.mesh.mesh import Mesh
 from core.mesh.skin import Skin
 from core.record import freeze
 from viewport.scene import Coat, Color, GuideLines, Look, Scene, Surface, mean_width
+
+if TYPE_CHECKING:  # their kernels load with the first coat, a window starts without them
+    from core.groom.children import Children, Traits
 
 SKIN = (0.36, 0.35, 0.34)
 # what bare parts of a feathered animal are painted in, by words in their names: linear RGB

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.window.desk import Desk
-from app.window.live_picture import LivePicture
 from app.window.match.marks import Sheet
 from core.image.plate import Plate
 from core.image.plate_view import pixels_per_pixel
@@ -18,6 +17,9 @@ from core.match.solved import SolvedCamera
 from core.match.through import Through, through_lens
 from tools.solve_edits import solved_of
 from viewport.through_lens import Bent
+
+if TYPE_CHECKING:  # with kernels of coats, which a window starts without
+    from app.window.live_picture import LivePicture
 
 KEPT = 256 << 20  # bytes of pictures
 COARSEST = 0.125  # pixels drawn for one of the plate

@@ -12,7 +12,7 @@ from pytestqt.qtbot import QtBot
 from app.window.hotkeys import Hotkeys
 from app.window.timeline.curve_panel import CurvePanel
 from app.window.timeline.curve_view import CurveView
-from app.window.window_commands import PANELS, shown_panels, written_panels
+from app.window.window_commands import AT_FIRST_HIDDEN, PANELS, shown_panels, written_panels
 from core.curve import Curve, Key
 from core.document import with_groom
 from core.value import Constant
@@ -186,7 +186,7 @@ def test_every_curve_fills_the_height_when_asked(host: Host, panel: CurvePanel) 
 
 
 def test_a_panel_that_is_new_since_a_workspace_was_saved_is_shown() -> None:
-    assert shown_panels(()) == tuple(name for name in PANELS if name not in ("curves", "feather", "space"))
+    assert shown_panels(()) == tuple(name for name in PANELS if name not in AT_FIRST_HIDDEN)
     old = written_panels({"scene", "curves"})
     assert shown_panels(old) == ("scene", "curves")
     assert "maps" in shown_panels([name for name in old if "maps" not in name])
