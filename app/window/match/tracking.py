@@ -31,7 +31,7 @@ STEPS = {
     "forward": "Track forward", "backward": "Track backward", "next": "Track one frame on",
     "previous": "Track one frame back", "between": "Track between keys", "both": "Track both ways",
 }
-SHOWN_EVERY = 40  # ms; a picture takes the time in which many more points are made
+SHOWN_EVERY = 30  # ms; a picture takes the time in which many more points are made
 
 
 class Work:
