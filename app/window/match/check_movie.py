@@ -1,4 +1,4 @@
-"""A movie to judge a solve by: the plate with points, ground and test cubes where the solved camera sees them."""
+"""A movie to judge a solve by: the plate with points, ground, test cubes and the scene as the camera sees them."""
 
 from __future__ import annotations
 

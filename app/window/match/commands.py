@@ -309,7 +309,8 @@ PLATE_FILES: tuple[Command, ...] = (
             "the plate, and put it back.", lambda w: w.match.doors.ask_lens_maps(),
             "core.formats.stmap_file.write_stmap", "file", enabled=needs_solved_plate, icon="export",
             words="stmap undistort redistort exr distortion overscan"),
-    Command("file.check_movie", "Movie of the solve…", "Writes the plate with points, ground and test cubes as a "
-            "movie, to judge the solve by.", lambda w: w.match.doors.ask_check_movie(), "app.movie.write_movie", "file",
-            enabled=needs_solved_plate, icon="playblast", words="qc quality overlay playblast mp4 matchmove check"),
+    Command("file.check_movie", "Movie of the solve…", "Writes the plate with points, ground, test cubes and "
+            "the scene over it as a movie, to judge the solve by.", lambda w: w.match.doors.ask_check_movie(),
+            "app.movie.write_movie", "file", enabled=needs_solved_plate, icon="playblast",
+            words="qc quality overlay playblast mp4 matchmove check"),
 )
