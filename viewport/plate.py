@@ -56,7 +56,8 @@ class PlatePicture:
         framebuffer.viewport = (0, 0, *size)
         if pixels is not None:
             texture = self._frame(pixels)
-            sharp = (box[2] - box[0]) / pixels.shape[1] >= SHARP_FROM
+            tall, wide = pixels.shape[:2]
+            sharp = min((box[2] - box[0]) / wide, (box[3] - box[1]) / tall) >= SHARP_FROM
             texture.filter = (moderngl.LINEAR, moderngl.NEAREST if sharp else moderngl.LINEAR)
             self.view.images.draw(texture, box, size)
             if bent is not None:

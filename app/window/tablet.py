@@ -27,14 +27,13 @@ def modifier_names(modifiers: Qt.KeyboardModifier) -> tuple[str, ...]:
 def mouse_pointer(event: QMouseEvent, ratio: float) -> Pointer:
     """A sample of the mouse. `ratio` : device pixels for one of Qt's."""
     place = event.position()
-    # a mouse names the pixel it is on, whose centre is meant
-    return _pointer((place.x() + 0.5) * ratio - 0.5, (place.y() + 0.5) * ratio - 0.5, event.modifiers(),
-                    event.timestamp())
+    # a mouse names the pixel of the screen it is on, divided by the ratio; the centre of that pixel is meant
+    return _pointer(place.x() * ratio, place.y() * ratio, event.modifiers(), event.timestamp())
 
 
 def pen_pointer(event: QTabletEvent, ratio: float) -> Pointer:
     """A sample of a pen, with its pressure, tilt and the end it is held by."""
-    place = event.position()
+    place = event.position()  # of the tip, between pixels too, from the corner of the first one
     pointer = _pointer(place.x() * ratio - 0.5, place.y() * ratio - 0.5, event.modifiers(), event.timestamp())
     return pointer._replace(
         pressure=min(max(float(event.pressure()), LEAST_PRESSURE), 1.0), tilt_x=math.radians(event.xTilt()),
@@ -44,7 +43,7 @@ def pen_pointer(event: QTabletEvent, ratio: float) -> Pointer:
 
 def place_pointer(place: QPointF, ratio: float, modifiers: Qt.KeyboardModifier) -> Pointer:
     """Where a hovering mouse is, when no event of its own says so."""
-    return _pointer((place.x() + 0.5) * ratio - 0.5, (place.y() + 0.5) * ratio - 0.5, modifiers, 0)
+    return _pointer(place.x() * ratio, place.y() * ratio, modifiers, 0)
 
 
 def _pointer(x: float, y: float, modifiers: Qt.KeyboardModifier, milliseconds: int) -> Pointer:

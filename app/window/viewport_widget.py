@@ -123,8 +123,8 @@ class Viewport(QOpenGLWindow):
         return size_of(max(len(self.views.methods), 1), self._whole())
 
     def _whole(self) -> tuple[int, int]:
-        ratio = self.devicePixelRatio()
-        return max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
+        size = self.size() * self.devicePixelRatio()  # halves are rounded as Qt does, else the picture is a pixel off
+        return max(size.width(), 1), max(size.height(), 1)
 
     def _in_pane(self, pointer: Pointer) -> Pointer:
         """A pointer in pixels of its pane; what goes on stays in the pane it began in."""

@@ -29,7 +29,8 @@ def missed() -> list[str]:
     window.commands.run("view.frame_all")
     hand.rest()
     ratio = view.devicePixelRatio()
-    wrong = [] if view.pixels() == (round(view.width() * ratio), round(view.height() * ratio)) else ["size"]
+    image = view.grabFramebuffer()
+    wrong = [] if view.pixels() == (image.width(), image.height()) else ["size"]
     desk.choose("select", size=RADIUS, through=True)
     guides = desk.document.grooms[0].guides
     camera = desk.workspace.cameras[0]
