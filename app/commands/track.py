@@ -21,7 +21,7 @@ from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.mix import mixed
 from core.image.plate import ChannelMix
-from core.match.follow import with_found
+from core.match.follow import NOT_FOLLOWED, with_found
 from core.match.outline import held_off
 from core.match.plane_tracker import plane_steps
 from core.match.track import MODELS, PlaneTrack, Track, TrackSettings
@@ -208,7 +208,9 @@ def _track_warnings(tracks: tuple[Track, ...], span: range) -> list[str]:
     words = []
     for track in tracks:
         if len(track.frames) and not track.name.startswith("auto"):
-            if track.frames[-1] < span[-1]:
+            if len(track.frames) <= len(track.keys) < len(span):
+                words.append(NOT_FOLLOWED.format(track.name))
+            elif track.frames[-1] < span[-1]:
                 words.append(f"track {track.name} ends at frame {track.frames[-1]}")
             gaps = int(track.frames[-1] - track.frames[0] + 1 - len(track.frames))
             if gaps:

@@ -2,7 +2,9 @@
 
 The frame's raw pixels are explained by the warped template: I(x) = a_c B_c(u(x)) + b_c,
 u = G (x - p) / (1 + h.(x - p)), p the position sought. Gauss-Newton on position, warp and, per channel, gain a and
-bias b; the latter are eliminated (Schur complement), so the covariance of p has them marginalised. Only the smooth
+bias b; the latter are eliminated (Schur complement), so the covariance of p has them marginalised. A number more says
+how much blurrier or sharper the frame is (the Laplacian of B, half a change of the blur's variance): without it one
+edge would be scaled until it is as sharp as in the frame, and its place with it. Only the smooth
 template is ever interpolated: the pixels that are compared stay as they are and their noise stays white. The set of
 pixels is frozen after it was chosen, else the iteration may run in a circle. Lucas & Kanade 1981; Baker & Matthews
 2004; covariance as in Förstner 1987.
@@ -21,6 +23,7 @@ DONE = 0.004  # pixels
 MOST_PIXELS = 4096
 FEWEST = 40  # pixels
 REACH = 3.0  # of the noise: where Geman & McClure's weights begin to fall
+SHARPNESS = 0.5  # pixels^2 of the template, standard deviation: half of how much the variance of its blur may differ
 F32_3D = types.Array(types.float32, 3, "C", readonly=True)
 F32_4D = types.Array(types.float32, 4, "C", readonly=True)
 BOOL_2D = types.Array(types.boolean, 2, "C", readonly=True)
@@ -29,8 +32,9 @@ I64_1D = types.Array(types.int64, 1, "C", readonly=True)
 f64, i64 = types.float64, types.int64
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # sums in any order, but what is not a number stays so
 # covariance xx, xy, yy for residuals of variance 1; variance of the residuals; correlation; iterations; pixels;
-# share of the weight that is left; 1 when it converged; lag correlation of the residuals; mean gain; last step
-FOUND = ("xx", "xy", "yy", "variance", "score", "iterations", "pixels", "share", "done", "lag", "gain", "step")
+# share of the weight that is left; 1 when it converged; lag correlation of the residuals; mean gain; last step;
+# how much of what the pattern seems to tell of its place where it tells least is not from noise in the template
+FOUND = ("xx", "xy", "yy", "variance", "score", "iterations", "pixels", "share", "done", "lag", "gain", "step", "known")
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -110,7 +114,42 @@ def _gather(shape, hold, keep, cx, cy, mu, mv, warp, half, xs, ys):  # type: ign
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scale, out):  # type: ignore[no-untyped-def]
+def _jacobian(warp, dx, dy, size, jac):  # type: ignore[no-untyped-def]
+    """How a point of the template moves with the numbers of the warp; returns the point."""
+    w = 1.0 / (1.0 + warp[6] * dx + warp[7] * dy)
+    u, v = (warp[2] * dx + warp[3] * dy) * w, (warp[4] * dx + warp[5] * dy) * w
+    jac[0, 0], jac[1, 0] = -(warp[2] - u * warp[6]) * w, -(warp[4] - v * warp[6]) * w
+    jac[0, 1], jac[1, 1] = -(warp[3] - u * warp[7]) * w, -(warp[5] - v * warp[7]) * w
+    if size == 4:
+        jac[0, 2], jac[1, 2], jac[0, 3], jac[1, 3] = u, v, -v, u
+    elif size >= 6:
+        jac[0, 2], jac[1, 2], jac[0, 3], jac[1, 3] = u, 0.0, v, 0.0
+        jac[0, 4], jac[1, 4], jac[0, 5], jac[1, 5] = 0.0, u, 0.0, v
+        jac[0, 6], jac[1, 6], jac[0, 7], jac[1, 7] = -u * dx * w, -v * dx * w, -u * dy * w, -v * dy * w
+    return u, v
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _place(normal, size, rhs, step, out):  # type: ignore[no-untyped-def]
+    """The covariance of the position by the factor of the normal matrix, into `out` (3,)."""
+    for k in range(2):
+        rhs[:] = 0.0
+        rhs[k] = 1.0
+        _back(normal, size, rhs, step)
+        if k == 0:
+            out[0], out[1] = step[0], step[1]
+        else:
+            out[2] = step[1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _greatest(xx, xy, yy):  # type: ignore[no-untyped-def]
+    """The greater eigenvalue of a symmetric 2 x 2 matrix."""
+    return 0.5 * (xx + yy) + math.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scale, noise, out):  # type: ignore[no-untyped-def]
     """One pattern in one frame. warp: position, G by rows, h (8); light: gain and bias per channel (C, 2)."""
     channels, side = coefs.shape[2], coefs.shape[0]
     xs, ys = np.empty(MOST_PIXELS, np.int32), np.empty(MOST_PIXELS, np.int32)
@@ -119,11 +158,15 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
     out[6] = count
     if count < FEWEST or count < 0.4 * wanted:
         return
-    normal, rhs, step = np.empty((8, 8)), np.empty(8), np.empty(8)
-    cross, pair, right = np.empty((channels, 8, 2)), np.empty((channels, 3)), np.empty((channels, 2))
+    normal, rhs, step = np.empty((9, 9)), np.empty(9), np.empty(9)
+    cross, pair, right = np.empty((channels, 9, 2)), np.empty((channels, 3)), np.empty((channels, 2))
     jac, value, gx, gy = np.empty((2, 8)), np.empty(channels), np.empty(channels), np.empty(channels)
+    whole = np.empty((9, 9))
+    bend, ddx, ddy = np.empty(channels), np.empty(4), np.empty(4)
+    last, sharp = size, 0.0
+    size += 1  # the last is how much blurrier or sharper the frame is than the key
     wx, wy, dxw, dyw = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    rest, e = np.empty(channels), np.empty(8)
+    rest, e = np.empty(channels), np.empty(9)
     for iteration in range(MOST_ITERATIONS):
         normal[:] = 0.0
         rhs[:] = 0.0
@@ -134,8 +177,7 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
         before = 0.0
         for n in range(count):
             dx, dy = xs[n] - warp[0], ys[n] - warp[1]
-            w = 1.0 / (1.0 + warp[6] * dx + warp[7] * dy)
-            u, v = (warp[2] * dx + warp[3] * dy) * w, (warp[4] * dx + warp[5] * dy) * w
+            u, v = _jacobian(warp, dx, dy, last, jac)
             px = min(max(cx + u, 1.0), side - 2.001)
             py = min(max(cy + v, 1.0), side - 2.001)
             i, j = int(px), int(py)
@@ -147,6 +189,7 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
             dxw[0], dxw[3] = -0.5 * r * r, 0.5 * s * s
             dxw[1] = s * (1.5 * s - 2.0)
             dxw[2] = -dxw[0] - dxw[1] - dxw[3]
+            ddx[0], ddx[1], ddx[2], ddx[3] = r, 1.0 - 3.0 * r, 1.0 - 3.0 * s, s
             r = 1.0 - t
             wy[0], wy[3] = r * r * r / 6.0, t * t * t / 6.0
             wy[1] = (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0
@@ -154,9 +197,10 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
             dyw[0], dyw[3] = -0.5 * r * r, 0.5 * t * t
             dyw[1] = t * (1.5 * t - 2.0)
             dyw[2] = -dyw[0] - dyw[1] - dyw[3]
+            ddy[0], ddy[1], ddy[2], ddy[3] = r, 1.0 - 3.0 * r, 1.0 - 3.0 * t, t
             error = 0.0
             for c in range(channels):
-                b = bx = by = 0.0
+                b = bx = by = bb = 0.0
                 for q in range(4):
                     a0, a1 = coefs[j + q - 1, i - 1, c], coefs[j + q - 1, i, c]
                     a2, a3 = coefs[j + q - 1, i + 1, c], coefs[j + q - 1, i + 2, c]
@@ -164,7 +208,9 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
                     b += wy[q] * row
                     by += dyw[q] * row
                     bx += wy[q] * (dxw[0] * a0 + dxw[1] * a1 + dxw[2] * a2 + dxw[3] * a3)
-                value[c], gx[c], gy[c] = b, bx, by
+                    bb += ddy[q] * row + wy[q] * (ddx[0] * a0 + ddx[1] * a1 + ddx[2] * a2 + ddx[3] * a3)
+                b += sharp * bb
+                value[c], gx[c], gy[c], bend[c] = b, bx, by, bb
                 rest[c] = image[ys[n], xs[n], c] - light[c, 0] * b - light[c, 1]
                 error += rest[c] * rest[c]
             weight = 1.0
@@ -177,14 +223,6 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
             if n and xs[n] == xs[n - 1] + 1:
                 lag += weight * rest[0] * before
             before = rest[0]
-            jac[0, 0], jac[1, 0] = -(warp[2] - u * warp[6]) * w, -(warp[4] - v * warp[6]) * w
-            jac[0, 1], jac[1, 1] = -(warp[3] - u * warp[7]) * w, -(warp[5] - v * warp[7]) * w
-            if size == 4:
-                jac[0, 2], jac[1, 2], jac[0, 3], jac[1, 3] = u, v, -v, u
-            elif size >= 6:
-                jac[0, 2], jac[1, 2], jac[0, 3], jac[1, 3] = u, 0.0, v, 0.0
-                jac[0, 4], jac[1, 4], jac[0, 5], jac[1, 5] = 0.0, u, 0.0, v
-                jac[0, 6], jac[1, 6], jac[0, 7], jac[1, 7] = -u * dx * w, -v * dx * w, -u * dy * w, -v * dy * w
             m00 = m01 = m11 = f0 = f1 = 0.0
             for c in range(channels):
                 a, b = light[c, 0], value[c]
@@ -199,11 +237,17 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
                 pair[c, 2] += weight
                 right[c, 0] += weight * b * rest[c]
                 right[c, 1] += weight * rest[c]
-                for k in range(size):
+                curve = a * bend[c]
+                for k in range(last):
                     g = weight * (p * jac[0, k] + q * jac[1, k])
                     cross[c, k, 0] += g * b
                     cross[c, k, 1] += g
-            for k in range(size):
+                    normal[last, k] += g * curve
+                cross[c, last, 0] += weight * curve * b
+                cross[c, last, 1] += weight * curve
+                normal[last, last] += weight * curve * curve
+                rhs[last] += weight * curve * rest[c]
+            for k in range(last):
                 h0 = weight * (m00 * jac[0, k] + m01 * jac[1, k])
                 h1 = weight * (m01 * jac[0, k] + m11 * jac[1, k])
                 rhs[k] += weight * (f0 * jac[0, k] + f1 * jac[1, k])
@@ -223,8 +267,12 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
                 rhs[k] -= ia * right[c, 0] + ib * right[c, 1]
                 for m in range(k + 1):
                     normal[k, m] -= ia * cross[c, m, 0] + ib * cross[c, m, 1]
+        prior = noise[0] / (SHARPNESS * SHARPNESS)
+        normal[last, last] += prior
+        rhs[last] -= prior * sharp
         for k in range(size):
             normal[k, k] *= 1.0 + 1e-9
+        whole[:] = normal
         if not _solve(normal, size, rhs, step):
             return
         free = max(weights * channels - size - 2 * channels, 1.0)
@@ -256,38 +304,51 @@ def _fit(image, hold, coefs, keep, cx, cy, mu, mv, warp, light, half, size, scal
         warp[0] += e[0]
         warp[1] += e[1]
         g0, g1, g2, g3 = warp[2], warp[3], warp[4], warp[5]
-        if size == 4:
+        sharp += e[last]
+        if last == 4:
             warp[2], warp[3] = g0 + e[2] * g0 - e[3] * g2, g1 + e[2] * g1 - e[3] * g3
             warp[4], warp[5] = g2 + e[2] * g2 + e[3] * g0, g3 + e[2] * g3 + e[3] * g1
-        elif size >= 6:
+        elif last >= 6:
             warp[2], warp[3] = g0 + e[2] * g0 + e[3] * g2, g1 + e[2] * g1 + e[3] * g3
             warp[4], warp[5] = g2 + e[4] * g0 + e[5] * g2, g3 + e[4] * g1 + e[5] * g3
-        if size == 8:
+        if last == 8:
             warp[6] += e[6]
             warp[7] += e[7]
         out[11] = shrink * far
         if shrink * far < DONE and iteration:
             out[8] = 1.0
             break
-    for k in range(2):
-        rhs[:] = 0.0
-        rhs[k] = 1.0
-        _back(normal, size, rhs, step)
-        if k == 0:
-            out[0], out[1] = step[0], step[1]
-        else:
-            out[2] = step[1]
+    _place(normal, size, rhs, step, out)
+    most = _greatest(out[0], out[1], out[2])
+    # the slopes of noise in the template are as good as those of texture to the sums above, but tell nothing: along a
+    # straight edge there are no others
+    gains = 0.0
+    for c in range(channels):
+        gains += light[c, 0] * light[c, 0]
+    # what looks like noise in the key may be fine texture; then the frame repeats it, and differs by less
+    gains = noise[2] * min(gains * noise[1], channels * out[3])
+    for n in range(count):
+        _jacobian(warp, xs[n] - warp[0], ys[n] - warp[1], last, jac)
+        for k in range(last):
+            for m in range(k + 1):
+                whole[k, m] -= gains * (jac[0, k] * jac[0, m] + jac[1, k] * jac[1, m])
+    if _solve(whole, size, rhs, step):
+        _place(whole, size, rhs, step, out)
+        out[12] = most / _greatest(out[0], out[1], out[2])
+    else:
+        out[0], out[1], out[2] = 1e9 * most, 0.0, 1e9 * most
 
 
 @njit(
     types.void(
-        F32_3D, BOOL_2D, F32_4D, BOOL_3D, f64[:, ::1], f64[:, ::1], f64[:, ::1], f64[:, :, ::1], f64[::1], f64,
-        I64_1D, I64_1D, i64, i64,
-        f64[:, ::1],
+        F32_3D, BOOL_2D, F32_4D, BOOL_3D, f64[:, ::1], f64[:, ::1], f64[:, ::1], f64[:, :, ::1], f64[::1], f64[:, ::1],
+        f64, I64_1D, I64_1D, i64, i64, f64[:, ::1],
     ),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST,
 )  # fmt: skip
-def fit_patterns(image, hold, coefs, keep, centre, middle, warp, light, scale, half, sizes, rows, start, stop, found):  # type: ignore[no-untyped-def]
+def fit_patterns(  # type: ignore[no-untyped-def]
+    image, hold, coefs, keep, centre, middle, warp, light, scale, noise, half, sizes, rows, start, stop, found
+):
     """Fit the patterns `rows`[start:stop] to a frame, from the warps they have.
 
     Parameters
@@ -298,9 +359,11 @@ def fit_patterns(image, hold, coefs, keep, centre, middle, warp, light, scale, h
     warp : (N, 8) float64, changed: x, y of the point; G by rows; h.
     light : (N, C, 2) float64, changed: gain and bias.
     scale : (N,) variance of the noise where weights are to be robust; 0 for least squares.
+    noise : (N, 3) variance of the noise at the key; the same beside edges, zero where the frame is that of the key;
+        what noise of variance 1 adds to the square of a template's slope along an axis.
     half : half the side of the pattern in template pixels.
     sizes : (N,) of each pattern: 2 translation, 4 similarity, 6 affine, 8 homography.
-    found : (N, 12) float64, changed: see FOUND.
+    found : (N, 13) float64, changed: see FOUND.
     """
     for k in range(start, stop):
         n = rows[k]
@@ -318,5 +381,6 @@ def fit_patterns(image, hold, coefs, keep, centre, middle, warp, light, scale, h
             half,
             sizes[n],
             scale[n],
+            noise[n],
             found[n],
         )

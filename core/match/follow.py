@@ -13,6 +13,7 @@ from core.record import freeze
 Way = Literal["forward", "backward", "next", "previous", "between", "both"]
 WAYS: tuple[Way, ...] = ("forward", "backward", "next", "previous", "between", "both")
 COLUMNS = ("frames", "points", "covariance", "own", "score")
+NOT_FOLLOWED = "track {} was not followed: its pattern shows too little beside noise, or one edge only; take a corner"
 
 
 class Stretch(NamedTuple):

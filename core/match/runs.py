@@ -38,10 +38,13 @@ SPOILT = 4.0  # times the noise of the key: more than that is not usual
 LED = 3.0  # pixels off the place its neighbours tell, for every frame out of sight
 SURPRISE = 2.0  # pixels off the place foretold
 UNSURE = 1.0  # pixels, standard deviation
+FAINT = 0.2  # of what a pattern seems to tell of its place, that which is not from noise: with less it is not followed
+LEAST = 1e-3  # the same, where it divides
 NEIGHBOURS = 5
 PEAKS = 3  # of the correlation that are tried
 NEARER = 0.1  # correlation that the edge of the search is worth less than its middle
 WHITE, CLUMPED = 0.07, 6.0  # lag correlation of good residuals; how much variance of the place more of it adds
+SLOWLY = 0.1  # from frame to frame, what is not to hang on single ones
 FADE = 0.8  # of the motion from frame to frame while out of sight
 EARNED = 30.0  # twice the logarithm of the likelihood that two more numbers must bring
 GRAIN = 4
@@ -68,13 +71,14 @@ class Runs:
             np.zeros((0, side, side), np.bool_),
             np.zeros((0, 2)),
             np.zeros((0, 2)),
-            np.zeros(0),
+            *(np.zeros(0) for _ in range(4)),
         )
         self.coefficients = self.templates.coefficients  # blurred like the frame at hand
         self.warp, self.motion = np.zeros((0, 8)), np.zeros((0, 8))
         self.light = np.zeros((0, channels, 2))
         self.shared = np.zeros((0, 3))  # covariance of the template's own place, in its pixels
         self.key_motion = np.zeros((0, 2))  # template pixels in a frame, at the key
+        self.known = np.zeros(0)  # of what the pattern seems to tell of its place, that which is not from noise
         self.usual, self.likeness, self.lag = np.zeros(0), np.zeros(0), np.zeros(0)  # of the frames before
         self.age, self.missed = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self.size, self.stop = np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -118,7 +122,7 @@ class Runs:
         fresh: dict[str, NDArray[Any]] = {
             "warp": warp, "motion": np.zeros((count, 8)), "light": light, "shared": np.zeros((count, 3)),
             "key_motion": np.zeros((count, 2)), "usual": made.noise, "likeness": np.ones(count),
-            "lag": np.full(count, WHITE),
+            "lag": np.full(count, WHITE), "known": np.ones(count),
             "age": np.zeros(count, np.int64), "missed": np.zeros(count, np.int64),
             "size": np.full(count, size, np.int64), "stop": stop, "alive": np.ones(count, np.bool_),
             "guided": np.zeros(count, np.bool_), "led": np.zeros(count, np.bool_),
@@ -126,7 +130,7 @@ class Runs:
         for name, value in fresh.items():
             setattr(self, name, np.concatenate((getattr(self, name), value)))
         warp, light = self.warp.copy(), self.light.copy()
-        found = self._fit(image, rows, warp, light, np.zeros(len(self.alive)))
+        found = self._fit(image, rows, warp, light, np.zeros(len(self.alive)), at_key=True)
         self.shared[rows] = found[rows, :3] * made.noise[:, None]
         self.alive[rows] = found[rows, COLUMN["pixels"]] > 0
         self._before = image
@@ -183,7 +187,10 @@ class Runs:
         warp: Reals,
         light: Reals,
         scale: Reals,
+        at_key: bool = False,
     ) -> Reals:
+        cut = self.templates
+        noise = np.stack((cut.noise, np.zeros_like(cut.grain) if at_key else cut.grain, cut.rough), axis=1)
         found = np.zeros((len(self.alive), len(FOUND)))
         rows = np.ascontiguousarray(rows)
 
@@ -198,6 +205,7 @@ class Runs:
                 warp,
                 light,
                 scale,
+                noise,
                 self.half,
                 self.size,
                 rows,
@@ -219,7 +227,10 @@ class Runs:
         """Which of the rows are believed."""
         f = found[rows]
         variance, score, usual = f[:, COLUMN["variance"]], f[:, COLUMN["score"]], self.usual[rows]
-        spread = np.sqrt(np.maximum(variance * (f[:, 0] + f[:, 2]), 0.0))
+        own = variance * (f[:, 0] + f[:, 2])
+        known = f[:, COLUMN["known"]]
+        shared = carried(warp[rows], self.shared[rows])[:, [0, 2]].sum(axis=1) / np.maximum(known, LEAST)
+        spread = np.sqrt(np.maximum(own + shared, 0.0))
         area = warp[rows, 2] * warp[rows, 5] - warp[rows, 3] * warp[rows, 4]
         before = told[rows, 2] * told[rows, 5] - told[rows, 3] * told[rows, 4]
         ratio = area / np.where(before == 0.0, 1.0, before)
@@ -238,6 +249,7 @@ class Runs:
         good &= off < np.where(self.led[rows], LED * (1.0 + missed), 1.5 * self.settings.search + 1.0)
         room = 1.4 * (1.0 + 0.1 * missed)
         good &= (ratio > 1.0 / room) & (ratio < room)
+        good &= (known > 0.0) & (np.where(fresh, known, self.known[rows]) > FAINT)
         return good & np.where(calm, near, anywhere & like)
 
     def _again(
@@ -308,6 +320,7 @@ class Runs:
         every = np.arange(len(rows))
         fit_patterns(
             self._before, NO_HOLD, cut.coefficients, cut.keep, cut.centre, cut.middle, back, light, np.zeros(len(rows)),
+            np.stack((cut.noise, cut.grain, cut.rough), axis=1),
             self.half, sizes, every, 0, len(rows), found,
         )  # fmt: skip
         off = np.linalg.norm(back[:, :2] - start, axis=1)
@@ -406,6 +419,8 @@ class Runs:
         found: Reals,
     ) -> Seen:
         kept, lost = rows[good], rows[~good]
+        known = found[rows, COLUMN["known"]]
+        self.known[rows] += SLOWLY * (known - self.known[rows])
         moved = warp[kept] - self.warp[kept]
         gap = (self.missed[kept] + 1.0)[:, None]
         self.motion[kept] = moved / gap
@@ -427,8 +442,13 @@ class Runs:
         self.alive[lost[(self.missed[lost] > self.settings.patience) | (self.age[lost] == 0)]] = False
         # residuals of a model that does not quite hold are correlated, and say less than their number
         self.lag[kept] += np.where(young, 0.5, 0.2) * (found[kept, COLUMN["lag"]] - self.lag[kept])
-        own = found[kept, :3] * (variance * clumped(self.lag[kept]))[:, None]
-        return Seen(kept, self.warp[kept, :2].copy(), own + carried(self.warp[kept], self.shared[kept]), own, score)
+        # the noise that is left in a template is in what the track shares, not in the frame
+        grain = np.minimum(self.templates.grain[kept] * found[kept, COLUMN["gain"]] ** 2, variance)
+        left = self.templates.left[kept] * grain
+        own = found[kept, :3] * (np.maximum(variance - left, 0.5 * variance) * clumped(self.lag[kept]))[:, None]
+        self.known[kept[self.age[kept] == 1]] = known[good][self.age[kept] == 1]
+        shared = carried(self.warp[kept], self.shared[kept]) / np.maximum(known[good], LEAST)[:, None]
+        return Seen(kept, self.warp[kept, :2].copy(), own + shared, own, score)
 
 
 def _inside(warp: Reals, image: Image) -> Mask:

@@ -15,6 +15,7 @@ from scipy.fft import dctn, idctn
 from scipy.ndimage import spline_filter1d
 
 MARGIN = 10  # pixels around the pattern that blur, warps and the spline's support may reach
+EDGE, WITHIN = 2.5, 0.911  # standard deviations of noise, and the share of its variance that is within them
 STRENGTHS = np.geomspace(1e-3, 300.0, 24)
 
 
@@ -26,6 +27,9 @@ class Templates(NamedTuple):
     centre : (N, 2) float64, x and y of the point inside (or beside) the template.
     middle : (N, 2) float64, from the point to the middle of the pattern.
     noise : (N,) float64, variance of the noise that was taken out, per channel.
+    grain : (N,) float64, the same, by the finest differences of what is no edge.
+    left, rough : (N,) float64, what noise of variance 1 leaves in the template after that, and what it adds to the mean
+        square of the slope along an axis.
     """
 
     coefficients: NDArray[np.float32]
@@ -33,6 +37,9 @@ class Templates(NamedTuple):
     centre: NDArray[np.float64]
     middle: NDArray[np.float64]
     noise: NDArray[np.float64]
+    grain: NDArray[np.float64]
+    left: NDArray[np.float64]
+    rough: NDArray[np.float64]
 
     def with_more(self, more: Templates) -> Templates:
         """These and then those of `more`."""
@@ -42,6 +49,9 @@ class Templates(NamedTuple):
             np.concatenate((self.centre, more.centre)),
             np.concatenate((self.middle, more.middle)),
             np.concatenate((self.noise, more.noise)),
+            np.concatenate((self.grain, more.grain)),
+            np.concatenate((self.left, more.left)),
+            np.concatenate((self.rough, more.rough)),
         )
 
 
@@ -74,29 +84,44 @@ def cut_templates(
     pixels = image[rows[:, :, None], columns[:, None, :]].astype(np.float64)
     if hold is not None:
         keep &= ~hold[rows[:, :, None], columns[:, None, :]]
-    smooth, noise = denoise(pixels)
-    return Templates(spline_coefficients(smooth), keep, reach + points - whole, offsets, noise)
+    smooth, noise, left, rough = denoise(pixels)
+    grain = np.minimum(noise, _grain(pixels))
+    return Templates(spline_coefficients(smooth), keep, reach + points - whole, offsets, noise, grain, left, rough)
 
 
-def denoise(pixels: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smoothing splines of patches (N, S, S, C), and the variance of what was taken out (N,)."""
+def denoise(pixels: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Smoothing splines of patches (N, S, S, C); `noise`, `left` and `rough` of :class:`Templates`, each (N,)."""
     size, channels = pixels.shape[1], pixels.shape[3]
     wave = 2.0 - 2.0 * np.cos(np.pi * np.arange(size) / size)
     stiff = (wave[:, None] + wave) ** 2
     spectrum = dctn(pixels, axes=(1, 2), norm="ortho")
     power = (spectrum**2).sum(axis=3)
     count = size * size
-    score, rests = [], []
+    score, rests, remains, slopes = [], [], [], []
     for strength in STRENGTHS:
         taken = strength * stiff / (1.0 + strength * stiff)
         rest = (taken**2 * power).sum(axis=(1, 2)) / (count * channels)
         share = taken.mean()  # 1 - trace / n
         score.append(rest / share**2)
         rests.append(rest / (taken**2).mean())
+        remains.append(((1.0 - taken) ** 2).mean())
+        slopes.append(((1.0 - taken) ** 2 * wave).mean())
     best = np.argmin(score, axis=0)
     strength = STRENGTHS[best][:, None, None, None]
     smooth = idctn(spectrum / (1.0 + strength * stiff[:, :, None]), axes=(1, 2), norm="ortho")
-    return smooth, np.asarray(rests)[best, np.arange(len(best))]
+    noise = np.asarray(rests)[best, np.arange(len(best))]
+    return smooth, noise, np.asarray(remains)[best], np.asarray(slopes)[best]
+
+
+def _grain(pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Variance of the noise of patches (N, S, S, C) by their finest differences (Immerkaer 1996), edges left out."""
+    along = pixels[:, 2:] - 2.0 * pixels[:, 1:-1] + pixels[:, :-2]
+    fine = (along[:, :, 2:] - 2.0 * along[:, :, 1:-1] + along[:, :, :-2]).reshape(len(pixels), -1) ** 2 / 36.0
+    variance = np.median(fine, axis=1) / 0.455
+    for _ in range(3):  # the middle of values in whole steps jumps; the mean of what is no edge does not
+        inside = fine < EDGE * EDGE * variance[:, None] + 1e-30
+        variance = (fine * inside).sum(axis=1) / np.maximum(inside.sum(axis=1), 1) / WITHIN
+    return np.asarray(variance)
 
 
 def spline_coefficients(pixels: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -19,7 +19,7 @@ from core.errors import UserError
 from core.image.frame_cache import GivenUp
 from core.image.plate import Plate
 from core.image.plate_view import plate_size
-from core.match.follow import Stretch, Way, stretch_of, with_found
+from core.match.follow import NOT_FOLLOWED, Stretch, Way, stretch_of, with_found
 from core.match.outline import Mask, held_off
 from core.match.track import PlaneTrack, Track, TrackSettings
 from tools.match_edits import add_tracks, put_planes, put_tracks, selected_tracks, shown_plate
@@ -154,6 +154,10 @@ class MatchTracking(QObject):
                 with_found(now[i], by_id[i], s.made) for i, s in stretches.items() if i in now and i in by_id)
             if ready and self.desk.edit(STEPS[way], put_tracks, ready) and way in ("next", "previous"):
                 self.desk.set_workspace(frame=self.desk.workspace.frame + (1.0 if way == "next" else -1.0))
+            still = [t.name for t in ready if len(t.frames) <= len(t.keys)]
+            if still:
+                words = NOT_FOLLOWED.format(", ".join(still))
+                self.desk.said.emit(f"{words[0].upper()}{words[1:]}.")
 
         self._start(STEPS[way], plate, tuple(stretches.values()), settings, 0, done)
 

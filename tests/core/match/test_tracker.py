@@ -1,5 +1,6 @@
 """Tracking against closed-form truth: place, calibrated covariance, light, loss and return, keys on both sides."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -121,6 +122,33 @@ def test_a_bar_over_a_part_of_the_pattern_moves_nothing_far():
     kept = [track for track in tracks if track.frames[-1] == 19]
     assert len(kept) >= 7
     assert max(np.abs(errors(track)[track.frames > 13]).max() for track in kept) < 0.2
+
+
+def edge(k, texture, angle, step, seed):
+    """A straight edge of 120 steps of light that moves by `step` a frame, with a texture of so many over noise of 2."""
+    rng = np.random.default_rng([seed, k])
+    fine = cv2.GaussianBlur(np.random.default_rng(seed).normal(0.0, 1.0, (600, 600)), (0, 0), 3.0)
+    x, y = np.meshgrid(np.arange(200.0) - step[0] * k, np.arange(200.0) - step[1] * k)
+    across = (y - 100.0) * np.cos(angle) - (x - 100.0) * np.sin(angle)
+    fine = np.float32(fine / fine.std())
+    moved = cv2.remap(fine, np.float32(x + 200.0), np.float32(y + 200.0), cv2.INTER_CUBIC)
+    image = 60.0 + 120.0 / (1.0 + np.exp(-across / 0.8)) + texture * moved + rng.normal(0.0, 2.0, x.shape)
+    return (np.clip(np.round(image), 0, 255) / 255.0).astype(np.float32)[:, :, None]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 0.8, 1.4])
+@pytest.mark.parametrize("step", [(1.5, 0.2), (3.0, 3.0)])
+def test_along_an_edge_that_has_no_texture_nothing_slides(angle, step):
+    """Noise in the key is no texture: such a pattern is not followed; with texture that is more than noise it is."""
+    start = keyed([np.array([100.0, 100.0])])
+    for seed in range(3):
+        (bare,) = followed(range(12), start, lambda k, s=seed: edge(k, 0.0, angle, step, s))
+        assert list(bare.frames) == [0]
+        (rich,) = followed(range(12), start, lambda k, s=seed: edge(k, 10.0, angle, step, s))
+        error = rich.points - 100.0 - np.arange(12)[:, None] * np.array(step)
+        assert list(rich.frames) == list(range(12))
+        assert np.abs(error).max() < 0.6
+        assert np.mean([_chi2(e, c) for e, c in zip(error[1:], rich.covariance[1:], strict=True)]) < 4.0
 
 
 def test_a_point_that_cannot_be_seen_is_carried_by_a_pattern_beside_it():

@@ -151,6 +151,22 @@ def test_the_distance_between_two_tracks_is_asked_for_in_metres(opened: Opened, 
     assert desk.session.history.undo_name == "Set distance"
 
 
+def test_a_pattern_of_one_edge_is_not_followed_and_it_is_said_why(opened: Opened, tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    for k in range(5):
+        light = 40.0 + 120.0 / (1.0 + np.exp(-(np.arange(HEIGHT) - 80.0 - k) / 0.8))
+        frame = light[:, None] + rng.normal(0.0, 2.0, (HEIGHT, WIDTH))
+        cv2.imwrite(str(tmp_path / f"edge.{k + 1}.png"), np.clip(frame, 0, 255).astype(np.uint8))
+    hand = opened_plate(opened, tmp_path)
+    desk, said = hand.window.desk, []
+    desk.said.connect(said.append)
+    click(hand, np.array([120.0, 80.0]))
+    hand.window.commands.run("match.forward")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    assert len(desk.document.tracks[0].frames) == 1
+    assert any("one edge only" in words for words in said)
+
+
 def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:
     hand = opened_plate(opened, plate)
     view, eye, desk = hand.view, hand.window.match.eye, hand.window.desk
