@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import typer
@@ -14,17 +14,21 @@ from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
 from core.feather.attributes import column
 from core.feather.coat.coat import FeatherCoat
+from core.feather.coat.condensed import coat_condensed
+from core.feather.coat.curves import coat_curves, kinds_of
 from core.feather.coat.export import crossing_wings, instances, left_crossing, shown_rows, wing_rows
 from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Laid, Plumage
-from core.feather.coat.worn import worn_preset, worn_values
+from core.feather.coat.worn import parts_of, worn_preset, worn_values
 from core.feather.look import FeatherLook, look_of
 from core.feather.pieces import FeatherMesh
 from core.formats.usd_feathers import FeatherFrame
 from core.mesh.skin import Skin
 
 Figures = dict[str, Any]
-EXPORTED = ("age", "spacing", "tract")  # columns every program gets beside places and ids
+Form = Literal["instances", "meshes", "shafts", "barbs", "condensed"]
+CURVES: tuple[Form, ...] = ("shafts", "barbs", "condensed")
+EXPORTED = ("age", "spacing", "tract", "length")  # columns every program gets beside places and ids
 LISTED = 100  # crossing pairs named in a report
 
 
@@ -69,41 +73,59 @@ def worse(one: Figures, other: Figures) -> Figures:
     }
 
 
-def coat_look(coat: FeatherCoat) -> FeatherLook:
-    """The material of a coat: that of the feathers on its body."""
-    return look_of(worn_values(coat, worn_preset(coat)))
+def form_of(each: bool, curves: str | None) -> Form:
+    """What the options ``--meshes`` and ``--curves KIND`` ask for; wrong usage when there is no such kind, or both."""
+    if curves is None:
+        return "meshes" if each else "instances"
+    found = next((form for form in CURVES if form == curves), None)
+    if found is None:
+        raise typer.BadParameter(f"curves are {', '.join(CURVES)}, not {curves!r}", param_hint="--curves")
+    if each:
+        raise typer.BadParameter("choose either --meshes or --curves")
+    return found
 
 
-def shaft_radii(coat: FeatherCoat) -> tuple[float, float]:
-    """Radius at root and tip, in shaft lengths, of the shafts of the feathers on a coat's body."""
-    values = worn_values(coat, worn_preset(coat))
-    return float(values[column("shaftRadius")]), float(values[column("shaftRadiusTip")])
+def coat_looks(coat: FeatherCoat) -> dict[str, FeatherLook]:
+    """The materials of a coat, one for each preset its parts wear, in the order of ``kinds_of``."""
+    worn = {worn_preset(coat, part) for part in parts_of(coat)}
+    return {name: look_of(worn_values(coat, name)) for name in sorted(worn)}
 
 
 def export_frame(
-    laid: Laid, frame: float, each: bool, evaluator: Evaluator, added: NDArray[np.float64] | None = None
+    laid: Laid, coat: FeatherCoat, frame: float, form: Form, evaluator: Evaluator,
+    added: NDArray[np.float64] | None = None, barbs: int | None = None,
 ) -> tuple[FeatherFrame, Figures]:
-    """One frame as it is written, and what crosses in it; `added` (``added_at_rest``) where it is one of many."""
-    rows = shown_rows(laid)
-    attributes = {name: laid.fields[name][rows] for name in EXPORTED if name in laid.fields}
+    """One frame as it is written, and what crosses in it.
+
+    form : what the feathers become. added : ``added_at_rest``, where it is one of many. barbs : a side at most.
+    """
+    rows, wings = shown_rows(laid), wing_rows(laid)
+    names, kinds = kinds_of(laid, coat)
+    known = {name: np.asarray(laid.fields[name]) for name in EXPORTED if name in laid.fields}
+    known["wear"] = np.array([_wear(worn_values(coat, name)) for name in names])[kinds]
+    attributes = {name: values.astype(np.float32) for name, values in known.items()}
+    of_skin = {name: values[rows] for name, values in attributes.items()}
     figures: Figures
-    if each:
-        left = left_crossing(laid, evaluator.workers)
-        vanes = laid.layered.vanes[rows]
-        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], vanes, attributes)
-        figures = {}
-    else:
+    if form == "instances":
         found = instances(laid, evaluator.workers, added)
-        left = found.left
-        vanes = found.vanes
-        made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, attributes)
+        left, vanes = found.left, found.vanes
+        made = FeatherFrame(frame, laid.skin.points, found, found.ids, None, of_skin, kinds=kinds[rows])
         figures = {
             "shapes": len(found.prototypes), "quantising_error": found.error,
             "crossings_16_bit": len(found.coarse.first),
         }
-    wings = wing_rows(laid)
+    else:
+        left, vanes = left_crossing(laid, evaluator.workers), laid.layered.vanes[rows]
+        made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], vanes, of_skin, kinds=kinds[rows])
+        figures = {}
+    if form == "condensed":
+        made = made._replace(curves=lambda: coat_condensed(laid, coat, barbs), attributes=attributes)
+    elif form in ("shafts", "barbs"):
+        made = made._replace(curves=lambda: coat_curves(laid, coat, form == "barbs", barbs), attributes=attributes)
     if len(wings):
-        made = made._replace(wing_ids=laid.ids[wings], wing_vanes=laid.layered.vanes[wings])
+        made = made._replace(
+            wing_ids=laid.ids[wings], wing_vanes=laid.layered.vanes[wings], wing_kinds=kinds[wings],
+            wing_attributes={name: values[wings] for name, values in attributes.items()})
         with_skin, among = crossing_wings(laid, vanes, evaluator.workers)
         figures = {
             **figures, "wing_feathers": len(wings), "crossings_of_wings_with_skin_feathers": with_skin,
@@ -115,6 +137,12 @@ def export_frame(
         "feathers": len(rows), "crossings": len(left.first), "skin_hits": len(left.skin), "pairs": left.pairs,
         **figures, "worst": worst[:LISTED],
     }
+
+
+def _wear(values: NDArray[np.float32]) -> float:
+    """How worn feathers of a type are, 0 .. 1."""
+    edge, tip = column("wearEdge*"), column("wearTip*")
+    return float(np.mean([values[edge : edge + 2], values[tip : tip + 2]]))
 
 
 def feather_meshes(

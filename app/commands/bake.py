@@ -12,7 +12,17 @@ from typing import Annotated
 import typer
 
 from app.deliver import posed_document
-from app.feather_frames import Figures, coat_look, export_frame, frame_range, say_beyond_clips, worse
+from app.feather_frames import (
+    CURVES,
+    Figures,
+    Form,
+    coat_looks,
+    export_frame,
+    form_of,
+    frame_range,
+    say_beyond_clips,
+    worse,
+)
 from app.report import Report, peak_megabytes
 from core.document import find_mesh, keys_of
 from core.errors import UserError
@@ -32,11 +42,13 @@ def command(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder the files go to; beside the project when not given.", show_default=False)] = None,
     processes: Annotated[int, typer.Option(min=1, max=256, help="Frames baked at once; by default one for each core.")] = os.cpu_count() or 1,
     each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
+    curves: Annotated[str | None, typer.Option(help=f"Write curves for hair renderers: {', '.join(CURVES)}.")] = None,
+    barbs: Annotated[int | None, typer.Option(min=1, max=2000, help="Barbs a side at most, wider by what is left out; all when not given.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Bake every frame by itself: no frame reads another, so that any may be baked again, anywhere, in any order."""
     report = Report(as_json)
-    wanted = frame_range(frames)
+    wanted, form = frame_range(frames), form_of(each, curves)
     assert wanted is not None  # the option is required
     if file.suffix.lower() != ".filo":
         raise UserError(f"{file.name} is no project; save one with feathers as .filo and bake that")
@@ -49,7 +61,7 @@ def command(
         raise UserError(f"the folder {folder} does not exist; make it first")
     say_beyond_clips(document, wanted, report)
     numbers = range(wanted[0], wanted[1] + 1)
-    jobs = [(str(file), coat.id, frame, str(_place(folder, file, coat.name, frame)), each)
+    jobs = [(str(file), coat.id, frame, str(_place(folder, file, coat.name, frame)), form, barbs)
             for coat in shown for frame in numbers]
     figures: Figures = {}
     with report.working(total=len(jobs)), report.stage("bake", f"baking {len(jobs)} frames"):
@@ -67,7 +79,7 @@ def _place(folder: Path, file: Path, name: str, frame: int) -> Path:
     return folder / f"{file.stem}.{plain}.{frame:04d}.usdc"
 
 
-Job = tuple[str, int, int, str, bool]
+Job = tuple[str, int, int, str, Form, int | None]
 
 
 def _all(jobs: list[Job], processes: int) -> list[Figures]:
@@ -99,16 +111,16 @@ def _opened(file: str, coat_id: int, _written: int) -> _Coat:
 
 def bake_frame(job: Job) -> Figures:
     """Bake one frame of one coat into its file; what it has to say of itself."""
-    file, coat_id, frame, path, each = job
+    file, coat_id, frame, path, form, barbs = job
     kept = _opened(file, coat_id, os.stat(file).st_mtime_ns)
     item = find_mesh(kept.document, kept.coat.mesh_id)
     skin = posed_document(kept.document, float(frame), kept.evaluator)[item.id]
     laid = kept.plumage.at_frame(
         kept.coat, keys_of(kept.document, kept.coat), item.mesh, skin, float(frame), float(kept.document.first_frame))
-    written, figures = export_frame(laid, float(frame), each, kept.evaluator, kept.added)
+    written, figures = export_frame(laid, kept.coat, float(frame), form, kept.evaluator, kept.added, barbs)
     with atomic_write(path) as temporary:
         writer = FeatherWriter(
-            temporary, kept.coat.name, item.mesh, maker(), coat_look(kept.coat), True, kept.document.fps)
+            temporary, kept.coat.name, item.mesh, maker(), coat_looks(kept.coat), True, kept.document.fps)
         writer.write(written)
         writer.close(float(frame), float(frame))
     return figures

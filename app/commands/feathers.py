@@ -9,7 +9,17 @@ from typing import Annotated
 import typer
 
 from app.deliver import draw, posed_document
-from app.feather_frames import Figures, coat_look, export_frame, frame_range, say_beyond_clips, shaft_radii, worse
+from app.feather_frames import (
+    CURVES,
+    Figures,
+    Form,
+    coat_looks,
+    export_frame,
+    form_of,
+    frame_range,
+    say_beyond_clips,
+    worse,
+)
 from app.report import Report, peak_megabytes
 from core.document import Document, MeshObject, with_feathers, with_groom
 from core.errors import UserError
@@ -42,7 +52,8 @@ def command(
     wings: Annotated[bool, typer.Option("--wings/--no-wings", help="Give a rig whose joints are called humerus, forearm and hand the feathers of wings and tail, beyond the count.")] = True,
     frames: Annotated[str | None, typer.Option(help="Frames to write, as A-B; the mesh must move.")] = None,
     each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
-    curves: Annotated[bool, typer.Option("--curves", help="Write the shafts alone, as curves with widths for hair renderers.")] = False,
+    curves: Annotated[str | None, typer.Option(help=f"Write curves with widths for hair renderers: {', '.join(CURVES)} (Houdini's).")] = None,
+    barbs: Annotated[int | None, typer.Option(min=1, max=2000, help="Barbs a side at most, wider by what is left out; all when not given.")] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of the file where it does not say: m, cm, mm, in, ft.")] = None,
     up: Annotated[str | None, typer.Option(help="Up axis of the file where it does not say: y or z.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Of everything random; the same seed gives the same coat.")] = 0,
@@ -52,7 +63,7 @@ def command(
     report = Report(as_json)
     if placement not in CHOICES:
         raise typer.BadParameter(f"placement is one of {', '.join(CHOICES)}, not {placement!r}")
-    wanted = frame_range(frames)
+    wanted, form = frame_range(frames), form_of(each, curves)
     _check(output)
     evaluator = Evaluator()
     with report.working(total=5 + len(output)):
@@ -70,7 +81,7 @@ def command(
             plumage.bed(dressed.coat, dressed.keys, item.mesh)
         with report.stage("layer", "laying feathers over one another"):
             rest = plumage.at_rest(dressed.coat, dressed.keys, item.mesh, float(document.first_frame))
-        found = _written(output, document, dressed, plumage, rest, wanted, each, curves, evaluator, report)
+        found = _written(output, document, dressed, plumage, rest, wanted, form, barbs, evaluator, report)
     result = {
         "keys": len(dressed.keys.guides), **found, "seconds": report.seconds, "peak_mb": peak_megabytes(),
         "outputs": [str(path) for path in output], "preset": preset, "placement": placement, "seed": seed,
@@ -109,13 +120,12 @@ def _document(path: Path, unit: str | None, up: str | None, moving: bool, report
 
 def _written(
     outputs: list[Path], document: Document, dressed: Dressed, plumage: Plumage, rest: Laid,
-    wanted: tuple[int, int] | None, each: bool, curves: bool, evaluator: Evaluator, report: Report,
+    wanted: tuple[int, int] | None, form: Form, barbs: int | None, evaluator: Evaluator, report: Report,
 ) -> Figures:
     """Write every frame to every output; the worst counts of all frames, made on what was written."""
     item = document.meshes[0]
     numbers = [document.first_frame] if wanted is None else list(range(wanted[0], wanted[1] + 1))
     figures: Figures = {}
-    each = each or curves
     with ExitStack() as stack:
         writers = []
         for path in outputs:
@@ -128,17 +138,17 @@ def _written(
                 continue
             temporary = stack.enter_context(atomic_write(path))
             writers.append(FeatherWriter(
-                temporary, dressed.coat.name, item.mesh, maker(), coat_look(dressed.coat), wanted is not None,
-                document.fps, shaft_radii(dressed.coat) if curves else None))
+                temporary, dressed.coat.name, item.mesh, maker(), coat_looks(dressed.coat), wanted is not None,
+                document.fps))
         start = float(document.first_frame)
-        added = None if wanted is None or each else added_at_rest(rest, evaluator.workers)
+        added = None if wanted is None or form != "instances" else added_at_rest(rest, evaluator.workers)
         for frame in numbers:
             with report.stage("frames", f"frame {frame}"):
                 laid = rest
                 if wanted is not None:
                     skin: Skin = posed_document(document, float(frame), evaluator)[item.id]
                     laid = plumage.at_frame(dressed.coat, dressed.keys, item.mesh, skin, float(frame), start)
-                written, made = export_frame(laid, frame, each, evaluator, added)
+                written, made = export_frame(laid, dressed.coat, frame, form, evaluator, added, barbs)
             figures = worse(figures, made)
             with report.stage("export", f"writing frame {frame}"):
                 for writer in writers:

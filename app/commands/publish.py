@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from app.deliver import draw
-from app.feather_frames import coat_look, export_frame
+from app.feather_frames import coat_looks, export_frame
 from app.report import Report
 from core.document import Document, find_mesh, keys_of
 from core.errors import UserError
@@ -80,10 +80,10 @@ def _export(document: Document, folder: Path, picture: bool, report: Report) -> 
         mesh = find_mesh(document, coat.mesh_id).mesh
         laid = Plumage(evaluator).at_rest(coat, keys_of(document, coat), mesh, float(document.first_frame))
         feathers += coat_meshes(laid, coat)
-        written, figures = export_frame(laid, float(document.first_frame), False, evaluator)
+        written, figures = export_frame(laid, coat, float(document.first_frame), "instances", evaluator)
         if figures["crossings"] or figures["skin_hits"]:
             report.note(f"{coat.name}: {figures['crossings']} feathers still cross, {figures['skin_hits']} reach the skin")
-        writer = FeatherWriter(folder / f"feathers_{coat.id}.usdc", coat.name, mesh, maker(), coat_look(coat), False)
+        writer = FeatherWriter(folder / f"feathers_{coat.id}.usdc", coat.name, mesh, maker(), coat_looks(coat), False)
         writer.write(written)
         writer.close()
     if picture and document.meshes:

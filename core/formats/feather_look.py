@@ -50,8 +50,18 @@ def usd_material(stage: Any, path: str, look: FeatherLook) -> Any:
     ):
         surface = UsdShade.Shader.Define(stage, f"{path}/{name}")
         surface.CreateIdAttr(shader)
+        color = UsdShade.Shader.Define(stage, f"{path}/{name}_color")  # the feather's own, the look's where it has none
+        color.CreateIdAttr("ND_geompropvalue_color3" if target else "UsdPrimvarReader_float3")
+        asked, fallback = ("geomprop", "default") if target else ("varname", "fallback")
+        color.CreateInput(asked, types.String).Set("displayColor")
+        kind_of = types.Color3f if target else types.Float3
+        color.CreateInput(fallback, kind_of).Set(Gf.Vec3f(*look.color))
+        read = color.CreateOutput("out" if target else "result", kind_of)
         for given, kind, value in inputs:
-            surface.CreateInput(given, kinds[kind]).Set(Gf.Vec3f(*value) if isinstance(value, tuple) else value)
+            told = surface.CreateInput(given, kinds[kind])
+            told.Set(Gf.Vec3f(*value) if isinstance(value, tuple) else value)
+            if kind == "color3":
+                told.ConnectToSource(read)
         made = surface.CreateOutput("surface" if not target else "out", types.Token)
         output = material.CreateSurfaceOutput(target) if target else material.CreateSurfaceOutput()
         output.ConnectToSource(made)

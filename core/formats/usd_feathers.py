@@ -1,14 +1,14 @@
-"""Coats of feathers as OpenUSD: rigid instances of shapes, a mesh of every feather, or the curve of every shaft.
+"""Coats of feathers as OpenUSD: rigid instances of shapes, a mesh of every feather, or curves.
 
 What is written, under the default prim ``/Feathers`` (metres, Y up, extents authored)::
 
     /Feathers/<name>               PointInstancer: positions, orientations, scales, protoIndices, ids
-    /Feathers/<name>/Prototypes    one Mesh for every quantised shape, feathers of length 1
-    /Feathers/<name>               or Mesh: all feathers, with the primvar feather_id per face
-    /Feathers/<name>               or BasisCurves: their shafts, with widths and the primvar feather_id per curve
-    /Feathers/<name>_wings         Mesh or BasisCurves: the feathers of wings and tail, each as it is, with feather_id
+    /Feathers/<name>/Prototypes    one Mesh for every quantised shape of every type, feathers of length 1
+    /Feathers/<name>               or Mesh: all feathers, with feather_id per face and a GeomSubset of each type
+    /Feathers/<name>/<type>_<k>    or BasisCurves (``usd_feather_curves``): shafts, with barbs, or condensed
+    /Feathers/<name>_wings         Mesh: the feathers of wings and tail, each as it is, with feather_id
     /Feathers/mesh                 the animal, moving where it moves
-    /Feathers/Looks/feather        UsdPreviewSurface and MaterialX, bound to both
+    /Feathers/Looks/<type>         UsdPreviewSurface and MaterialX; they read displayColor
 
 ``ids`` are those of the document: the same feather has the same id in every frame and version. ``orientationsf`` holds
 the turns in 32 bits and wins where it is known; ``orientations`` the same in 16 for older readers.
@@ -16,26 +16,34 @@ the turns in 32 bits and wins where it is known; ``orientations`` the same in 16
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import UserError
+from core.feather.coat.condensed import CondensedFeathers
+from core.feather.coat.curves import FeatherCurves
 from core.feather.coat.export import Instances
 from core.feather.look import FeatherLook
 from core.formats.feather_look import usd_material
+from core.formats.usd_feather_curves import clear_curves, write_curves
 from core.mesh.mesh import Mesh
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 
 
 class FeatherFrame(NamedTuple):
-    """One frame of a coat: instances, or vanes (N, R, C, 3) float32 with ids (N,) when every feather is a mesh.
+    """One frame of a coat: instances, or vanes (N, R, C, 3) float32 with ids (N,), a mesh of every feather, or curves.
 
     points : (V, 3) float32, the animal. attributes : primvars of the feathers, (N,) float32 by name.
-    wing_ids, wing_vanes : (M,) int32, (M, R, C, 3) float32, feathers of wings, or None.
+    wing_ids, wing_vanes : (M,) int32, (M, R, C, 3) float32, feathers of wings, or None; wing_attributes : theirs.
+    kinds, wing_kinds : (N,), (M,) int32, which of the writer's looks each feather has; None for the first one.
+    curves : makes the feathers, also those of wings, some at a time; `attributes` then has a number for every row of
+        the laid coat.
     """
 
     frame: float
@@ -46,6 +54,10 @@ class FeatherFrame(NamedTuple):
     attributes: dict[str, NDArray[np.float32]]
     wing_ids: NDArray[np.int32] | None = None
     wing_vanes: NDArray[np.float32] | None = None
+    wing_attributes: Mapping[str, NDArray[np.float32]] = MappingProxyType({})
+    kinds: NDArray[np.int32] | None = None
+    wing_kinds: NDArray[np.int32] | None = None
+    curves: Callable[[], Iterator[FeatherCurves | CondensedFeathers]] | None = None
 
 
 class FeatherWriter:
@@ -54,13 +66,12 @@ class FeatherWriter:
     Parameters
     ----------
     path : .usda, .usdc or .usd. name : of the coat. mesh : the animal at rest. maker : name and version of the program.
-    look : of its feathers from afar. animated : values become time samples of their frames.
-    shafts : radius of a shaft at its root and tip, in shaft lengths: feathers with vanes are written as curves.
+    looks : of its feathers from afar, by the type they are. animated : values become time samples of their frames.
     """
 
     def __init__(
-        self, path: Path, name: str, mesh: Mesh, maker: str, look: FeatherLook, animated: bool,
-        fps: float = 24.0, shafts: tuple[float, float] | None = None,
+        self, path: Path, name: str, mesh: Mesh, maker: str, looks: Mapping[str, FeatherLook], animated: bool,
+        fps: float = 24.0,
     ) -> None:
         from pxr import Sdf, Usd, UsdGeom
 
@@ -70,7 +81,7 @@ class FeatherWriter:
         self._layer = Sdf.Layer.CreateNew(str(path), args=made)
         self._stage = stage = Usd.Stage.Open(self._layer)
         self._animated = animated
-        self._shafts = shafts
+        self._crate = self._layer.GetFileFormat().formatId == "usdc"
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         root = UsdGeom.Xform.Define(stage, "/Feathers").GetPrim()
@@ -78,7 +89,10 @@ class FeatherWriter:
         root.SetCustomDataByKey("filoplume", {"version": maker, "name": name})
         self._place = f"/Feathers/{_identifier(name)}"
         self._known: dict[tuple[int, ...], int] = {}
-        self._material = usd_material(stage, "/Feathers/Looks/feather", look)
+        self._kinds = list(looks)
+        self._looks = list(looks.values())
+        self._materials = [usd_material(stage, f"/Feathers/Looks/{_named(kind)}", looks[kind]) for kind in looks]
+        self._curves: dict[str, Any] = {}
         self._mesh = _animal(stage, mesh)
         self._coat: Any = None
         self._wings: Any = None
@@ -93,13 +107,18 @@ class FeatherWriter:
         time = Usd.TimeCode(frame.frame) if self._animated else Usd.TimeCode.Default()
         self._mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(frame.points, np.float32)), time)
         self._mesh.CreateExtentAttr().Set(_extent(frame.points), time)
+        if frame.curves is not None:
+            self._write_curves(frame.curves(), frame.attributes, time)
+            return
         if frame.instances is not None:
             self._write_instances(frame, frame.instances, time)
         elif frame.vanes is not None:
-            self._coat = self._write_each(self._coat, self._place, frame.ids, frame.vanes, frame.attributes, time)
+            self._coat = self._write_each(
+                self._coat, self._place, frame.ids, frame.vanes, frame.kinds, frame.attributes, time)
         if frame.wing_ids is not None and frame.wing_vanes is not None:
             self._wings = self._write_each(
-                self._wings, f"{self._place}_wings", frame.wing_ids, frame.wing_vanes, {}, time)
+                self._wings, f"{self._place}_wings", frame.wing_ids, frame.wing_vanes, frame.wing_kinds,
+                frame.wing_attributes, time)
 
     def close(self, first: float | None = None, last: float | None = None) -> None:
         """Save what was written."""
@@ -108,6 +127,7 @@ class FeatherWriter:
             self._stage.SetEndTimeCode(last)
         self._layer.Save()
         self._stage = self._mesh = self._coat = self._wings = self._layer = None
+        self._curves = {}
 
     def _write_instances(self, frame: FeatherFrame, found: Instances, time: Any) -> None:
         from pxr import UsdGeom, UsdShade, Vt
@@ -117,15 +137,18 @@ class FeatherWriter:
             self._coat = UsdGeom.PointInstancer.Define(stage, self._place)
             UsdGeom.Scope.Define(stage, f"{self._place}/Prototypes")
         coat = self._coat
-        for key, vane in found.prototypes.items():
+        kinds = _of_kind(frame.kinds, len(found.ids))
+        keys = [tuple(key) for key in np.column_stack([kinds, found.keys]).tolist()]
+        for key in dict.fromkeys(keys):
             if key in self._known:
                 continue
+            vane = found.prototypes[key[1:]]
             number = self._known[key] = len(self._known)
             mesh = UsdGeom.Mesh.Define(stage, f"{self._place}/Prototypes/shape_{number}")
             _write_vanes(mesh, vane[None], None)
-            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(self._material)
+            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(self._materials[key[0]])
             coat.CreatePrototypesRel().AddTarget(mesh.GetPath())
-        rows = np.array([self._known[tuple(key)] for key in found.keys.tolist()], np.int32)
+        rows = np.array([self._known[key] for key in keys], np.int32)
         turns = np.ascontiguousarray(found.turns[:, [1, 2, 3, 0]])  # OpenUSD keeps the real part last in memory
         coat.CreateProtoIndicesAttr().Set(Vt.IntArray.FromNumpy(rows), time)
         coat.CreatePositionsAttr().Set(Vt.Vec3fArray.FromNumpy(found.positions), time)
@@ -135,62 +158,75 @@ class FeatherWriter:
         coat.CreateScalesAttr().Set(Vt.Vec3fArray.FromNumpy(scales), time)
         coat.CreateIdsAttr().Set(Vt.Int64Array.FromNumpy(found.ids.astype(np.int64)), time)
         coat.CreateExtentAttr().Set(_extent(found.vanes.reshape(-1, 3)), time)
-        self._write_attributes(coat, frame.attributes, UsdGeom.Tokens.vertex, 1, time)
+        self._write_of_each(coat, found.ids, kinds, frame.attributes, UsdGeom.Tokens.vertex, 1, time)
         coat.GetPrim().SetCustomDataByKey("filoplume:quantising_error", found.error)
 
     def _write_each(
         self, prim: Any, place: str, ids: NDArray[np.int32], vanes: NDArray[np.float32],
-        attributes: dict[str, NDArray[np.float32]], time: Any,
+        given: NDArray[np.int32] | None, attributes: Mapping[str, NDArray[np.float32]], time: Any,
     ) -> Any:
-        """Feathers as their own shapes, or as the curves of their shafts; the prim they are in."""
-        if self._shafts is not None:
-            return self._write_shafts(prim, place, ids, vanes, self._shafts, attributes, time)
-        from pxr import UsdGeom, UsdShade
-
-        if prim is None:
-            prim = UsdGeom.Mesh.Define(self._stage, place)
-            UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(self._material)
-        _write_vanes(prim, vanes, time)
-        self._write_of_each(prim, ids, attributes, 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1), time)
-        return prim
-
-    def _write_shafts(
-        self, prim: Any, place: str, ids: NDArray[np.int32], vanes: NDArray[np.float32], radii: tuple[float, float],
-        attributes: dict[str, NDArray[np.float32]], time: Any,
-    ) -> Any:
+        """Feathers as their own shapes; the mesh they are in."""
         from pxr import UsdGeom, UsdShade, Vt
 
-        shafts = np.ascontiguousarray(vanes[:, :, vanes.shape[2] // 2])  # the middle column of a vane
+        kinds, times = _of_kind(given, len(ids)), 2 * (vanes.shape[1] - 1) * (vanes.shape[2] - 1)
         if prim is None:
-            prim = UsdGeom.BasisCurves.Define(self._stage, place)
-            prim.CreateTypeAttr(UsdGeom.Tokens.linear)
-            prim.CreateWidthsAttr()
-            prim.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
-            UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(self._material)
-        count, rows = shafts.shape[:2]
-        lengths = np.linalg.norm(np.diff(shafts, axis=1), axis=2).sum(axis=1)
-        widths = 2.0 * lengths[:, None] * np.linspace(*radii, rows)
-        points = shafts.reshape(-1, 3)
-        prim.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, rows, np.int32)), time)
-        prim.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), time)
-        prim.GetWidthsAttr().Set(Vt.FloatArray.FromNumpy(widths.reshape(-1).astype(np.float32)), time)
-        prim.CreateExtentAttr().Set(_extent(points, float(widths.max(initial=0.0)) / 2.0), time)
-        self._write_of_each(prim, ids, attributes, 1, time)
+            prim = UsdGeom.Mesh.Define(self._stage, place)
+            UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(self._materials[int(kinds[0]) if len(kinds) else 0])
+        _write_vanes(prim, vanes, time)
+        self._write_of_each(prim, ids, kinds, attributes, UsdGeom.Tokens.uniform, times, time)
+        if len(self._kinds) > 1:
+            api = UsdShade.MaterialBindingAPI(prim)
+            for kind, name in enumerate(self._kinds):
+                subset = UsdGeom.Subset.Get(self._stage, prim.GetPath().AppendChild(_named(name)))
+                faces = np.flatnonzero(np.repeat(kinds == kind, times)).astype(np.int32)
+                if not subset and len(faces):
+                    subset = api.CreateMaterialBindSubset(_named(name), Vt.IntArray())
+                    UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(self._materials[kind])
+                if subset:
+                    subset.GetIndicesAttr().Set(Vt.IntArray.FromNumpy(faces), time)
         return prim
 
-    def _write_of_each(
-        self, prim: Any, ids: NDArray[np.int32], attributes: dict[str, NDArray[np.float32]], times: int, time: Any
+    def _write_curves(
+        self, chunks: Iterator[FeatherCurves | CondensedFeathers], attributes: dict[str, NDArray[np.float32]], time: Any
     ) -> None:
-        """Ids and attributes of feathers that are `times` faces or curves each."""
+        """Curves, a prim for some hundred feathers each; what is in a crate file leaves the memory at once."""
+        from pxr import UsdGeom
+
+        if not self._curves:
+            UsdGeom.Xform.Define(self._stage, self._place)
+        written: dict[str, int] = {}
+        paths = set()
+        named = {_identifier(name): column for name, column in attributes.items()}
+        for chunk in chunks:
+            number = written[chunk.kind] = written.get(chunk.kind, -1) + 1
+            path = f"{self._place}/{_named(chunk.kind)}_{number}"
+            material = self._materials[self._kinds.index(chunk.kind)]
+            self._curves[path] = write_curves(
+                self._stage, path, self._curves.get(path), chunk, named, material, time)
+            paths.add(path)
+            if self._crate:
+                self._layer.Save()
+        for path, prim in self._curves.items():
+            if path not in paths:
+                clear_curves(prim, time)
+
+    def _write_of_each(
+        self, prim: Any, ids: NDArray[np.int32], kinds: NDArray[np.int32],
+        attributes: Mapping[str, NDArray[np.float32]], each: Any, times: int, time: Any,
+    ) -> None:
+        """Ids, colours and attributes of feathers that are `times` faces each, or instances."""
         from pxr import Sdf, UsdGeom, Vt
 
         api = UsdGeom.PrimvarsAPI(prim)
-        made = api.CreatePrimvar("feather_id", Sdf.ValueTypeNames.IntArray, UsdGeom.Tokens.uniform)
+        made = api.CreatePrimvar("feather_id", Sdf.ValueTypeNames.IntArray, each)
         made.Set(Vt.IntArray.FromNumpy(np.repeat(ids, times)), time)
-        self._write_attributes(prim, attributes, UsdGeom.Tokens.uniform, times, time)
+        colors = np.array([look.color for look in self._looks], np.float32)[kinds]
+        made = api.CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, each)
+        made.Set(Vt.Vec3fArray.FromNumpy(np.repeat(colors, times, axis=0)), time)
+        self._write_attributes(prim, attributes, each, times, time)
 
     def _write_attributes(
-        self, prim: Any, attributes: dict[str, NDArray[np.float32]], each: Any, times: int, time: Any
+        self, prim: Any, attributes: Mapping[str, NDArray[np.float32]], each: Any, times: int, time: Any
     ) -> None:
         from pxr import Sdf, UsdGeom, Vt
 
@@ -250,6 +286,16 @@ def _animal(stage: Any, mesh: Mesh) -> Any:
         st = api.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
         st.Set(Vt.Vec2fArray.FromNumpy(mesh.uvs))
     return made
+
+
+def _of_kind(kinds: NDArray[np.int32] | None, count: int) -> NDArray[np.int32]:
+    return np.zeros(count, np.int32) if kinds is None else kinds
+
+
+def _named(kind: str) -> str:
+    from pxr import Tf
+
+    return str(Tf.MakeValidIdentifier(kind))
 
 
 def _identifier(name: str) -> str:

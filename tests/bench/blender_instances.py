@@ -45,7 +45,8 @@ def run() -> list[Row]:
     with tempfile.TemporaryDirectory(prefix="filoplume-bench-") as name:
         folder = Path(name)
         start = time.perf_counter()
-        writer = FeatherWriter(folder / "ours.usdc", "coat", mesh, "bench", FeatherLook((0.3, 0.2, 0.1)), False)
+        looks = {"contour": FeatherLook((0.3, 0.2, 0.1))}
+        writer = FeatherWriter(folder / "ours.usdc", "coat", mesh, "bench", looks, False)
         writer.write(FeatherFrame(1001.0, rest.skin.points, found, found.ids, None, {}))
         writer.close()
         write = time.perf_counter() - start

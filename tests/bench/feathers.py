@@ -138,7 +138,8 @@ def _torso(evaluator: Evaluator) -> list[Row]:
     ]
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        writer = FeatherWriter(Path(folder) / "coat.usdc", "coat", mesh, "bench", FeatherLook((0.3, 0.2, 0.1)), False)
+        looks = {"contour": FeatherLook((0.3, 0.2, 0.1))}
+        writer = FeatherWriter(Path(folder) / "coat.usdc", "coat", mesh, "bench", looks, False)
         writer.write(FeatherFrame(1001.0, rest.skin.points, found, found.ids, None, {}))
         writer.close()
         rows.append(Row("USD written", time.perf_counter() - start, "s"))

@@ -37,7 +37,7 @@ class Baker:
         skin = posed_document(self.document, frame, self.evaluator)[self.item.id]
         laid = self.plumage.at_frame(
             self.dressed.coat, self.dressed.keys, self.item.mesh, skin, frame, self.start)
-        written, _ = export_frame(laid, frame, False, self.evaluator, self.added)
+        written, _ = export_frame(laid, self.dressed.coat, frame, "instances", self.evaluator, self.added)
         assert written.instances is not None
         return hashlib.sha256(written.instances.vanes.tobytes() + written.instances.turns.tobytes()).hexdigest()
 

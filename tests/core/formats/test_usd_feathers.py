@@ -8,11 +8,12 @@ from core.evaluator import Evaluator
 from core.feather.coat.dress import dress_feathers
 from core.feather.coat.export import added_at_rest, instances
 from core.feather.coat.plumage import Plumage
-from core.feather.coat.posing import LENGTH
 from core.feather.look import FeatherLook
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.value import constant
 from tests.core.feather.coat.bodies import crossing_by_solving, egg
+
+LOOKS = {"contour": FeatherLook((0.3, 0.2, 0.1)), "down": FeatherLook((0.8, 0.8, 0.8))}
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +25,9 @@ def laid():
     evaluator.close()
 
 
-def opened(path, laid, animated=False, shafts=None, **given):
+def opened(path, laid, animated=False, **given):
     rest, _, mesh = laid
-    writer = FeatherWriter(path, "plumage", mesh, "test", FeatherLook((0.3, 0.2, 0.1)), animated, shafts=shafts)
+    writer = FeatherWriter(path, "plumage", mesh, "test", LOOKS, animated)
     for frame in (1001.0, 1002.0) if animated else (1001.0,):
         writer.write(FeatherFrame(frame, rest.skin.points, **given, attributes={}))
     writer.close(*((1001.0, 1002.0) if animated else ()))
@@ -77,21 +78,30 @@ def test_every_feather_its_own_mesh_keeps_every_point_and_id(tmp_path, laid):
     assert sorted(set(ids.tolist())) == rest.ids[rest.shown].tolist()
 
 
-def test_shafts_are_curves_from_root_to_tip_with_widths_and_ids(tmp_path, laid):
-    rest, _, _ = laid
+def test_every_type_has_its_material_on_instances_and_on_meshes(tmp_path, laid):
+    rest, evaluator, _ = laid
+    found = instances(rest, evaluator.workers)
+    kinds = (np.arange(len(found.ids)) % 3 == 0).astype(np.int32)
+    wanted = np.array([look.color for look in LOOKS.values()], np.float32)[kinds]
+    stage = opened(tmp_path / "coat.usdc", laid, instances=found, ids=found.ids, vanes=None, kinds=kinds)
+    coat = UsdGeom.PointInstancer(stage.GetPrimAtPath("/Feathers/plumage"))
+    shapes = [stage.GetPrimAtPath(path) for path in coat.GetPrototypesRel().GetTargets()]
+    worn = [UsdShade.MaterialBindingAPI(shape).ComputeBoundMaterial()[0].GetPath().name for shape in shapes]
+    told = [worn[proto] for proto in coat.GetProtoIndicesAttr().Get()]
+    assert told == [list(LOOKS)[kind] for kind in kinds]
+    color = UsdGeom.PrimvarsAPI(coat).GetPrimvar("displayColor")
+    np.testing.assert_array_equal(np.array(color.Get()), wanted)
     ids, vanes = rest.ids[rest.shown], rest.layered.vanes[rest.shown]
-    stage = opened(tmp_path / "hair.usdc", laid, shafts=(0.01, 0.002), instances=None, ids=ids, vanes=vanes)
-    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Feathers/plumage"))
-    points = np.array(curves.GetPointsAttr().Get()).reshape(len(ids), -1, 3)
-    assert curves.GetCurveVertexCountsAttr().Get() == [points.shape[1]] * len(ids)
-    np.testing.assert_allclose(points[:, 0], rest.feathers.roots[rest.shown], atol=1e-6)
-    along = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
-    np.testing.assert_allclose(along, rest.layered.poses[rest.shown][:, LENGTH], rtol=0.02)
-    widths = np.array(curves.GetWidthsAttr().Get()).reshape(len(ids), -1)
-    np.testing.assert_allclose(widths[:, [0, -1]] / along[:, None], [[0.02, 0.004]] * len(ids), rtol=1e-5)
-    assert curves.GetWidthsInterpolation() == UsdGeom.Tokens.vertex
-    named = UsdGeom.PrimvarsAPI(curves).GetPrimvar("feather_id")
-    assert (named.GetInterpolation(), list(named.Get())) == (UsdGeom.Tokens.uniform, ids.tolist())
+    stage = opened(tmp_path / "each.usdc", laid, instances=None, ids=ids, vanes=vanes, kinds=kinds)
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Feathers/plumage"))
+    faces = len(mesh.GetFaceVertexCountsAttr().Get())
+    subsets = UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets()
+    assert UsdGeom.Subset.ValidateFamily(mesh, UsdGeom.Tokens.face, UsdShade.Tokens.materialBind)[0]
+    of_face = np.full(faces, -1)
+    for subset in subsets:
+        name = UsdShade.MaterialBindingAPI(subset).ComputeBoundMaterial()[0].GetPath().name
+        of_face[np.array(subset.GetIndicesAttr().Get())] = list(LOOKS).index(name)
+    np.testing.assert_array_equal(of_face, np.repeat(kinds, faces // len(kinds)))
 
 
 def test_frames_become_time_samples(tmp_path, laid):
