@@ -2,12 +2,14 @@
 
 A shape is quantised in what a feather is bent, cupped and twisted by over its length, and in its outline; the error of
 that is measured on the vanes. As neighbours lie close, the quantised feathers are settled once more, turned and scaled
-but not reshaped, and what crosses is counted on exactly what is written.
+but not reshaped, and what crosses is counted on exactly what is written. Feathers that a hand has bent are no shape of
+any other: each is a prototype of its own, exactly as it lies.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,8 @@ from core.feather.coat.winged import Laid
 from core.workers import Workers
 
 STEPS = np.array([0.08, 0.12, 0.10])  # radians over the length of a feather, of bend, cup and twist
+BY_HAND = 1 << 30  # first of the bins of a feather that is bent by hand; then its id and what its shape comes to
+BENT = 1e-3  # of its length: a vane that lies farther from where its pose has it was bent by hand
 OUTLINE_STEP = 0.03  # of what an outline reaches to either side, and its tip out of the middle, in lengths
 
 
@@ -28,7 +32,7 @@ class Instances(NamedTuple):
 
     ids : (N,) int32. keys : (N, 7) int32, the bins of bend, cup, twist and outline, naming a prototype.
     positions : (N, 3) float32. turns : (N, 4) float32, quaternions w, x, y, z. scales : (N,) float32, metres.
-    prototypes : bins -> its vane (R, C, 3) float32 at length 1.
+    prototypes : bins -> its vane (``BY_HAND``, id, hash: of one bent by hand), (R, C, 3) float32 at length 1.
     error : the largest distance of a vane from what it stands for, over its length. left : what crosses, on these;
     coarse : the same for a reader that only knows turns of 16 bits.
     vanes : (N, R, C, 3) float32, what another program makes of it.
@@ -79,7 +83,7 @@ def left_crossing(laid: Laid, workers: Workers) -> Crossings:
 class _Rigid(NamedTuple):
     """Feathers as rigid copies before they settle: bins (B, 7) of shapes, `which` of them each is, poses (N, 6).
 
-    vanes : (B, R, C, 3) float32, of the shapes. feathers : those of the copies.
+    vanes : (B, R, C, 3) float32, of the shapes. feathers : those of the copies. by_hand : (N,) bool, bent ones.
     """
 
     bins: NDArray[np.int32]
@@ -87,6 +91,7 @@ class _Rigid(NamedTuple):
     vanes: NDArray[np.float32]
     feathers: Feathers
     poses: NDArray[np.float64]
+    by_hand: NDArray[np.bool_]
 
 
 def added_at_rest(rest: Laid, workers: Workers) -> NDArray[np.float64]:
@@ -113,12 +118,14 @@ def instances(laid: Laid, workers: Workers, added: NDArray[np.float64] | None = 
     own = laid.feathers.own[rows]
     rigid = _rigid(laid, rows, workers)
     bins, which, vanes = rigid.bins, rigid.which, rigid.vanes
-    error = _error(own, _turning(laid, rows), vanes, which, workers)
+    procedural = np.flatnonzero(~rigid.by_hand)
+    error = _error(own[procedural], _turning(laid, rows)[procedural], vanes, which[procedural], workers)
     poses = rigid.poses.copy()
     if added is not None:
         poses[:, [LIFT, ROLL]] += added[rows, :2]
         poses[:, LENGTH] *= added[rows, 2]
     settled = _settled(rigid, poses, laid, workers, added is None)
+    settled.poses[rigid.by_hand] = rigid.poses[rigid.by_hand]  # these lie where the hand has put them
     feathers = rigid.feathers
     turns = quaternions(feathers.frames, settled.poses).astype(np.float32)
     scales = settled.poses[:, LENGTH].astype(np.float32)
@@ -130,7 +137,7 @@ def instances(laid: Laid, workers: Workers, added: NDArray[np.float64] | None = 
     )
     return Instances(
         laid.ids[rows], bins[which], feathers.roots, turns, scales,
-        {tuple(int(v) for v in key): vanes[k] for k, key in enumerate(bins)}, error, left, coarse, written,
+        {tuple(int(v) for v in bins[k]): vanes[k] for k in np.unique(which)}, error, left, coarse, written,
     )
 
 
@@ -159,11 +166,34 @@ def _rigid(laid: Laid, rows: NDArray[np.int32], workers: Workers) -> _Rigid:
     vanes = pose_vanes(outlines, shapes, np.zeros((len(bins), 3), np.float32), upright, ranges=workers.ranges)
     rigid = np.zeros((len(rows), POSE))
     rigid[:, [LIFT, ROLL, LENGTH]] = poses[:, [LIFT, ROLL, LENGTH]]
+    by_hand = _bent(laid, rows, workers)
+    if by_hand.any():
+        hand = np.flatnonzero(by_hand)
+        rigid[hand, LIFT] = rigid[hand, ROLL] = 0.0
+        lying = laid.layered.vanes[rows[hand]].astype(np.float64) - laid.feathers.roots[rows[hand], None, None]
+        shaped = np.einsum("nrcx,nyx->nrcy", lying, laid.feathers.frames[rows[hand]].astype(np.float64))
+        shaped = (shaped / rigid[hand, LENGTH][:, None, None, None]).astype(np.float32)
+        which = which.copy()
+        which[hand] = len(bins) + np.arange(len(hand))
+        named = [[BY_HAND, laid.ids[rows[k]], crc32(shape.tobytes()) >> 1, 0, 0, 0, 0]
+                 for k, shape in zip(hand, shaped, strict=True)]
+        bins = np.concatenate([bins, np.array(named, np.int32)])
+        vanes = np.concatenate([vanes, shaped])
     feathers = Feathers(
         np.ascontiguousarray(vanes[which]), np.ascontiguousarray(laid.feathers.roots[rows]),
         np.ascontiguousarray(laid.feathers.frames[rows]), np.ascontiguousarray(laid.feathers.rank[rows]),
     )
-    return _Rigid(bins, which, vanes, feathers, rigid)
+    return _Rigid(bins, which, vanes, feathers, rigid, by_hand)
+
+
+def _bent(laid: Laid, rows: NDArray[np.int32], workers: Workers) -> NDArray[np.bool_]:
+    """Which feathers (N,) do not lie as their poses have them: those whose shafts a hand has bent."""
+    f = laid.feathers
+    posed = pose_vanes(
+        np.ascontiguousarray(f.own[rows]), laid.layered.poses[rows], np.ascontiguousarray(f.roots[rows]),
+        np.ascontiguousarray(f.frames[rows]), ranges=workers.ranges)
+    apart = np.linalg.norm(posed - laid.layered.vanes[rows], axis=-1).max(axis=(1, 2), initial=0.0)
+    return np.asarray(apart > BENT * laid.layered.poses[rows, LENGTH])
 
 
 def _settled(

@@ -6,8 +6,10 @@ from pxr import Gf, Usd, UsdGeom, UsdShade
 
 from core.evaluator import Evaluator
 from core.feather.coat.dress import dress_feathers
-from core.feather.coat.export import added_at_rest, instances
+from core.feather.coat.export import BY_HAND, added_at_rest, instances
 from core.feather.coat.plumage import Plumage
+from core.feather.coat.posing import LENGTH
+from core.feather.coat.proxy import keyed, promoted
 from core.feather.look import FeatherLook
 from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.value import constant
@@ -102,6 +104,37 @@ def test_every_type_has_its_material_on_instances_and_on_meshes(tmp_path, laid):
         name = UsdShade.MaterialBindingAPI(subset).ComputeBoundMaterial()[0].GetPath().name
         of_face[np.array(subset.GetIndicesAttr().Get())] = list(LOOKS).index(name)
     np.testing.assert_array_equal(of_face, np.repeat(kinds, faces // len(kinds)))
+
+
+def test_a_feather_bent_by_hand_is_an_instance_exactly_as_it_lies(tmp_path, laid):
+    _, evaluator, mesh = laid
+    coat, keys = dress_feathers(mesh, evaluator, 150, keys=12)
+    plumage = Plumage(evaluator)
+    rest = plumage.at_rest(coat, keys, mesh)
+    row = 40
+    frames = plumage.root_frames(coat, keys, mesh)
+    taken = promoted(
+        coat, int(rest.ids[row]), rest.layered.vanes[row], rest.feathers.roots[row], frames[row], 1001.0)
+    shaft = taken.proxies[0].rest.copy()
+    shaft[:, 2] += 0.5 * np.abs(shaft[-1, 1]) * np.linspace(0.0, 1.0, len(shaft), dtype=np.float32) ** 2
+    by_hand = keyed(taken, int(rest.ids[row]), 1001.0, shaft)
+    posed = plumage.at_frame(by_hand, keys, mesh, rest.skin, 1001.0)
+    length = rest.layered.poses[row, LENGTH]
+    assert np.abs(posed.layered.vanes[row] - rest.layered.vanes[row]).max() > 0.3 * length
+    for added in (None, added_at_rest(rest, evaluator.workers)):
+        found = instances(posed, evaluator.workers, added)
+        assert np.array_equal(found.ids, rest.ids)
+        assert np.abs(found.vanes[row] - posed.layered.vanes[row]).max() < 1e-5 * length + 1e-6
+        assert len(crossing_by_solving(found.vanes)) == len(found.left.first)
+    (mine,) = (key for key in found.prototypes if key[0] == BY_HAND)
+    assert mine[1] == rest.ids[row]
+    stage = opened(tmp_path / "coat.usdc", laid, instances=found, ids=found.ids, vanes=None)
+    coat = UsdGeom.PointInstancer(stage.GetPrimAtPath("/Feathers/plumage"))
+    place = coat.ComputeInstanceTransformsAtTime(Usd.TimeCode.Default(), Usd.TimeCode.Default())[row]
+    targets = coat.GetPrototypesRel().GetTargets()
+    shape = UsdGeom.Mesh(stage.GetPrimAtPath(targets[coat.GetProtoIndicesAttr().Get()[row]]))
+    placed = np.array([place.Transform(Gf.Vec3d(*map(float, point))) for point in shape.GetPointsAttr().Get()])
+    np.testing.assert_allclose(placed, posed.layered.vanes[row].reshape(-1, 3), atol=1e-5 * length + 1e-6)
 
 
 def test_frames_become_time_samples(tmp_path, laid):
