@@ -23,7 +23,7 @@ from core.kernel_cache import kernels_compiled
 # name of the command -> module of app.commands that holds a function `command`; order is the order of --help
 COMMANDS = (
     "window", "groom", "feather", "feathers", "convert", "info", "check", "render", "pose", "track",
-    "flow", "solve", "grid", "stmap", "photomodel", "run", "bake", "publish", "bench", "doctor", "demo",
+    "flow", "retime", "solve", "grid", "stmap", "photomodel", "run", "bake", "publish", "bench", "doctor", "demo",
 )
 HELP = ("-h", "--help")
 COMPILING_AFTER = 4.0  # seconds of loading a command, which take one or two when its kernels are in the cache

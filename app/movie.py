@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from core.errors import UserError
 from core.formats.atomic import atomic_write
+from core.formats.frame_file import frame_path
 from viewport.picture import write_png
 
 Picture = Callable[[float], NDArray[np.uint8]]  # (height, width, 3) sRGB, top row first, at a frame
@@ -21,18 +22,6 @@ CODECS = ("libx264", "mpeg4")  # the first one the library has
 QUALITY = {"libx264": {"crf": "18", "preset": "medium"}, "mpeg4": {"qmin": "2", "qmax": "4"}}
 BT709 = 1  # matrix, primaries and transfer of HD, in the numbers of ISO/IEC 23091-2
 LIMITED = 1  # video levels
-
-
-def frame_path(pattern: Path, frame: int) -> Path:
-    """The file of a frame: "cat.####.png" gives cat.1001.png; "cat.png" the same.
-
-    The number has as many digits as there are #, four without any; a minus stands before them.
-    """
-    name = pattern.name if "#" in pattern.name else f"{pattern.stem}.####{pattern.suffix}"
-    start = name.index("#")
-    digits = len(name[start:]) - len(name[start:].lstrip("#"))
-    number = f"{'-' if frame < 0 else ''}{abs(frame):0{digits}d}"
-    return pattern.with_name(name[:start] + number + name[start + digits :])
 
 
 def write_sequence(pattern: Path, frames: Sequence[int], picture: Picture, progress: Progress) -> list[Path]:

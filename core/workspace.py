@@ -101,19 +101,28 @@ class PlateLook(Record):
     gamma: Annotated[float, field(
         "Gamma", "Lifts what is dark on the screen above 1, to judge shadows; nothing that is tracked changes.", "",
         (0.3, 3.0), (0.05, 10.0), 0.1)] = 1.0
+    speed: Annotated[float, field(
+        "Speed", "How fast plates play; below 1 the frames in between are made by optical flow (Slow motion).", "",
+        (0.1, 2.0), (0.05, 10.0), 0.05)] = 1.0
     display: str = ""
 
     def __post_init__(self) -> None:
+        number(self, "speed", least=0.05, most=10.0)
         number(self, "exposure", least=-20.0, most=20.0)
         number(self, "gamma", least=0.05, most=10.0)
         if self.proxy not in PROXIES:
             raise ValueError(f"PlateLook.proxy must be one of {', '.join(PROXIES)}, not {self.proxy!r}")
+
+    def seen(self) -> tuple[str, float, float, str]:
+        """All of it that changes what a frame looks like."""
+        return self.proxy, self.exposure, self.gamma, self.display
 
     def words(self) -> str:
         """What is not shown as it is, in a few words; "" for nothing."""
         told = [f"exposure {self.exposure:+.1f} stops"] if self.exposure else []
         told += [f"gamma {self.gamma:.2f}"] if self.gamma != 1.0 else []
         told += [f"{self.proxy} proxy"] if self.proxy != "full" else []
+        told += [f"speed {self.speed:g}"] if self.speed != 1.0 else []
         return " · ".join(told)
 
 

@@ -21,6 +21,7 @@ from core.formats.track_file import SUFFIXES, read_tracks, write_tracks
 from core.formats.tracks_json import Tracks
 from core.image.mix import mixed
 from core.image.plate import ChannelMix
+from core.match.fill import fill_gaps
 from core.match.follow import NOT_FOLLOWED, with_found
 from core.match.outline import held_off
 from core.match.plane_tracker import plane_steps
@@ -45,6 +46,7 @@ def command(
     log: Annotated[bool, typer.Option("--log", help="Look at stops of light; for linear and dark plates.")] = False,
     denoise: Annotated[float, typer.Option(min=0.0, max=10.0, help="Take out grain of so many pixels first.")] = 0.0,
     contrast: Annotated[float, typer.Option(min=0.0, max=2000.0, help="Even out contrast over so many pixels; for dark plates.")] = 0.0,
+    fill: Annotated[bool, typer.Option("--fill", help="Fill the gaps of tracks by optical flow.")] = False,
     frames: Annotated[str | None, typer.Option(help="First and last frame, as 1001-1100; all of them otherwise.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page with curves and pictures: .html.")] = None,
     solved: Annotated[bool, typer.Option("--solve", help="Solve the camera from the tracks; -o says where it goes.")] = False,
@@ -73,7 +75,7 @@ def command(
     workers, decoder = Workers(), FrameDecoder()
     warnings: list[str] = []
     try:
-        with telling.working(total=5 if solved else 3):
+        with telling.working(total=(5 if solved else 3) + fill):
             with telling.stage("read", "looking at the plate"):
                 film = read_plate(plate, decoder)
                 span = _span(frames, film.frames)
@@ -102,6 +104,9 @@ def command(
                 was = {track.id: track for track in keyed}
                 made = tuple(
                     with_found(was[track.id], track, span) if track.id in was else track for track in tracking.tracks())
+            if fill:
+                with telling.stage("fill", "filling gaps"):
+                    made = fill_gaps(made, read, ranges=workers.ranges)
             warnings += _film_warnings(film.missing, source.broken, span)
             found = len(made) - len(keyed)
             if found < auto:

@@ -118,7 +118,7 @@ class MainWindow(QMainWindow):
         self.crash = CrashBar(self.crash_watch)
         self.plugins = PluginBar(session.tools.troubles)
         self.status = StatusLine(self.desk, self.hotkeys)
-        self.timeline = Timeline(self.desk)
+        self.timeline = Timeline(self.desk, speed=self.match.play_speed)
         self.curves = CurvePanel(self.desk, self.commands, self.hotkeys)
         self.pose_side = PoseSide(self.desk)
         self.feather_side = FeatherSide(self.desk, self.viewport.draw_beside, FoldMemory(self._folder))

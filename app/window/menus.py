@@ -34,7 +34,8 @@ PARTS: dict[str, tuple[Part, ...]] = {
         Part("add_dial", "Controls"), Part("limit_joint", "Joints"), Part("mirror_weights", "Skin weights"),
         Part("clear_mask", "Mask")),
     "match": (
-        Part("forward"), Part("features"), Part("solve"), Part("cube", "Solved camera"), Part("delete_shapes"),
+        Part("forward"), Part("features", "Features, planes, flow"), Part("solve"), Part("cube", "Solved camera"),
+        Part("delete_shapes"),
         Part("key", "Keys of tracks"), Part("delete", "Selected tracks"), Part("select_all"), Part("next_key"),
         Part("nudge_left", "Nudge"), Part("next_plate"),
         Part("take_photographs", "Model of photographs"), Part("build_polygon", "Build on points"),

@@ -207,3 +207,28 @@ def overlaps(side, step, out):  # type: ignore[no-untyped-def]
         for p in range(4):
             for q in range(4):
                 out[i + p, q - p + 3] += table[x - i * step, p] * table[x - i * step, q]
+
+
+@njit(types.void(F32_3D, F32_2D, types.float32, W_F32_3D), cache=True, nogil=True, error_model="numpy")
+def splat(vectors, weight, share, out):  # type: ignore[no-untyped-def]
+    """Every pixel's vector (H, W, 2), carried along a share of itself and summed onto the four pixels about that place.
+
+    weight : (H, W). out : (H, W, 3), the sums of weighted x, y and of the weights.
+    """
+    height, width = vectors.shape[:2]
+    out[:] = 0.0
+    for y in range(height):
+        for x in range(width):
+            u, v = vectors[y, x, 0], vectors[y, x, 1]
+            px, py = x + share * u, y + share * v
+            if not (-1.0 < px < width and -1.0 < py < height):
+                continue
+            i, j = int(np.floor(px)), int(np.floor(py))
+            s, t = px - i, py - j
+            for q in range(2):
+                for p in range(2):
+                    if 0 <= j + q < height and 0 <= i + p < width:
+                        w = weight[y, x] * (s if p else 1.0 - s) * (t if q else 1.0 - t)
+                        out[j + q, i + p, 0] += w * u
+                        out[j + q, i + p, 1] += w * v
+                        out[j + q, i + p, 2] += w

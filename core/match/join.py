@@ -49,7 +49,7 @@ def join_pieces(track: Track, pieces: list[Piece]) -> Track:
         if not ends:
             made.update(piece.rows())
     for first, last in pairwise(order):
-        made.update(_between(first, last, keys, by_key.get((first, 1)), by_key.get((last, -1))))
+        made.update(between(first, last, keys, by_key.get((first, 1)), by_key.get((last, -1))))
     for frame, point in keys.items():
         # what a template is off by stands on the frame it was cut from
         cut = [piece.shared for piece in pieces if piece.key == frame]
@@ -66,7 +66,7 @@ def join_pieces(track: Track, pieces: list[Piece]) -> Track:
     )
 
 
-def _between(
+def between(
     first: int, last: int, keys: dict[int, list[float]], forward: Piece | None, backward: Piece | None
 ) -> dict[int, NDArray[np.float64]]:
     """Frames from one key to the next. Where one misses the other's key, it is trusted less the further it went.

@@ -185,6 +185,12 @@ def badness_of(track: Track) -> NDArray[np.float64]:
     return bad
 
 
+def gaps_of(track: Track) -> list[tuple[int, int]]:
+    """The frames before and after every stretch in which a track was not seen."""
+    places = np.flatnonzero(np.diff(track.frames) > 1)
+    return [(int(track.frames[k]), int(track.frames[k + 1])) for k in places]
+
+
 class PlaneTrack(Record):
     """A flat piece of the scene through a plate, each frame as a whole: a corner pin. Pixels and frames as of a track.
 

@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from app.movie import frame_path, write_movie, write_sequence
+from app.movie import write_movie, write_sequence
 from core.errors import UserError
+from core.formats.frame_file import frame_path
 
 
 class Enough(Exception):

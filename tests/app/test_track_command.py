@@ -170,3 +170,27 @@ def test_planes_that_cannot_be_followed_are_refused_in_a_sentence(plate, tmp_pat
     assert code == 1
     assert word in error
     assert not (tmp_path / "o.json").exists()
+
+
+def test_a_plate_is_written_at_half_its_speed_and_gaps_are_filled(plate, tmp_path):
+    code, words, _ = filoplume("retime", plate, "--speed", "0.5", "-o", tmp_path / "slow.####.png", "--json")
+    assert code == 0
+    result = json.loads(words)
+    # 1001 to 1008 by halves are 15; what needs 1005 or 1006 is left out and named
+    assert (result["frames"], len(result["warnings"])) == (10, 5)
+    same, between = (cv2.imread(str(tmp_path / f"slow.000{n}.png")) for n in (1, 2))
+    assert np.array_equal(same, cv2.imread(str(plate / "shot.1001.png")))
+    truth = frame(0.5, noise=0.0)[:, :, ::-1]
+    inner = np.s_[10:-10, 10:-10]
+    assert np.abs(between - truth)[inner].mean() < 3.0
+    assert filoplume("retime", plate, "-o", tmp_path / "slow.####.exr")[0] == 1
+    assert filoplume("retime", plate, "-o", tmp_path / "no" / "slow.####.png")[0] == 1
+    keys, out = tmp_path / "in.json", tmp_path / "out.json"
+    hidden = [[k, *place(POINT, k - 1001), 0.01, 0.0, 0.01, 1.0] for k in (1001, 1004)]
+    keys.write_text(json.dumps({"size": [160, 120], "frames": [1001, 1008], "tracks": [
+        {"name": "eye", "keys": [1008], "points": [*hidden, [1008, *place(POINT, 7)]]}]}))
+    code, _, _ = filoplume("track", plate, "--tracks", keys, "--tracks-out", out, "--fill", "--json")
+    assert code == 0
+    points = {p[0]: p[1:3] for p in json.loads(out.read_text())["tracks"][0]["points"]}
+    assert {1001, 1002, 1003, 1004, 1007, 1008} <= points.keys()
+    assert np.linalg.norm(points[1002] - place(POINT, 1)) < 0.3

@@ -50,7 +50,8 @@ class Reel:
 
     def show_with(self, look: PlateLook) -> None:
         """Show frames in another way; they are not read again for it, unless as another proxy. Never waits."""
-        if look is self.look:
+        if look is self.look or look.seen() == self.look.seen():
+            self.look = look
             return
         if look.proxy != self.look.proxy:
             if self._proxy is not None:

@@ -21,7 +21,7 @@ from core.image.plate import Plate
 from core.image.plate_view import plate_size
 from core.match.follow import NOT_FOLLOWED, Stretch, Way, stretch_of, with_found
 from core.match.outline import Mask, held_off
-from core.match.track import PlaneTrack, Track, TrackSettings
+from core.match.track import PlaneTrack, Track, TrackSettings, gaps_of
 from tools.match_edits import add_tracks, put_planes, put_tracks, selected_tracks, shown_plate
 
 if TYPE_CHECKING:
@@ -80,6 +80,16 @@ class Work:
                     progress(min((number + done / count) / len(planes), 1.0))
                 made.append(plane)
         return tuple(made)
+
+    def fill(self, tracks: tuple[Track, ...], progress: Progress, cancelled: Asked) -> tuple[Track, ...]:
+        """The tracks with their gaps filled by optical flow."""
+        from core.match.fill import fill_gaps  # as above
+
+        with self._opened(cancelled) as read:
+            made = fill_gaps(tracks, read, ranges=_stopped_by(cancelled), progress=progress, cancel=cancelled)
+        if cancelled():
+            raise Cancelled
+        return made
 
     @contextmanager
     def _opened(self, cancelled: Asked) -> Iterator[Callable[[int], NDArray[np.float32] | None]]:
@@ -177,6 +187,31 @@ class MatchTracking(QObject):
                 self.desk.said.emit(f"{len(found)} tracks were made by themselves.")
 
         self._start("Automatic features", plate, (), TrackSettings(), count, done)
+
+    def fill_gaps(self) -> None:
+        """Fill the gaps of the selected tracks by optical flow, on another thread."""
+        plate = shown_plate(self.desk.document)
+        tracks = tuple(t for t in selected_tracks(self.desk.document) if plate is not None and t.plate_id == plate.id)
+        if plate is None or not tracks:
+            raise UserError("No track is selected; click one, or place one with Track point.")
+        if any(t.locked for t in tracks):
+            raise UserError(f"Track {next(t.name for t in tracks if t.locked)} is locked; unlock it first.")
+        if not any(gaps_of(t) for t in tracks):
+            raise UserError("The selected tracks have no gaps: they are seen on all frames between their ends.")
+        self._one_at_a_time()
+        self._forget()
+
+        def done(found: tuple[Track, ...]) -> None:
+            now = {t.id: t for t in self.desk.session.history.current.tracks}
+            old = {t.id: t for t in tracks}
+            ready = tuple(t for t in found if now.get(t.id) is old[t.id] and t is not old[t.id])
+            if ready:
+                self.desk.edit("Fill gaps", put_tracks, ready)
+            else:
+                self.desk.said.emit("Flow reached none of the gaps: frames are missing there.")
+
+        work = self._work(plate)
+        self._begin("Fill gaps", lambda progress, cancelled: work.fill(tracks, progress, cancelled), done)
 
     def track_planes(self) -> None:
         """Follow every plane of the plate that is not locked or hidden through the plate."""

@@ -19,6 +19,7 @@ from app.window.match.model_marks import model_marks
 from app.window.match.pattern import patches
 from app.window.match.scene_over import SceneOver
 from app.window.match.screen import PlateScreen, Shown
+from app.window.match.slow_motion import SlowMotion
 from app.window.match.solve_job import SolveJob
 from app.window.match.solve_marks import solve_marks
 from app.window.match.tracking import MatchTracking
@@ -49,12 +50,14 @@ class PlateView(QObject):
         self.eye = PlateEye(desk, size, self.fresh.emit)
         self.screen = PlateScreen(desk)
         self.tracking = MatchTracking(desk, self.screen)
+        self.slow = SlowMotion(desk, self.screen)
         self.solving = SolveJob(desk)
         self.model = ModelJob(desk, window)
         self.doors = MatchDoors(desk, window)
         self.scene = SceneOver(desk)
         self.screen.fresh.connect(self.fresh)
         self.tracking.made.connect(self.fresh)
+        self.slow.made.connect(self.fresh)
         self._picture: PlatePicture | None = None
         desk.session_replaced.connect(self._session_replaced)
 
@@ -80,6 +83,7 @@ class PlateView(QObject):
             self._picture = PlatePicture(view)
         frame, camera = self.eye.frame, self.eye.camera
         shown = self.screen.picture(plate, frame)
+        between = self.slow.picture(plate, self.desk.workspace.frame - plate.offset)
         sheet = Sheet(plate, frame, camera, size, ratio)
         marks = marks_of(self.desk.document, sheet) + self._live(sheet) + model_marks(self.desk.document, sheet)
         solved = solved_of(self.desk.document, plate.id)
@@ -91,7 +95,7 @@ class PlateView(QObject):
         words = self._words(shown, frame)
         here = shown is not None and shown.frame == frame
         self._picture.present(
-            framebuffer, size, None if shown is None else shown.pixels, box,
+            framebuffer, size, between if between is not None else None if shown is None else shown.pixels, box,
             (*ground_of(words, ratio), *marks, *over), words, ratio, small.insets,
             self.scene.over(plate, sheet) if here else None)
 
@@ -143,6 +147,10 @@ class PlateView(QObject):
         elif shown.words:
             lines.append((shown.words, "trouble"))
         return lines
+
+    def play_speed(self) -> float:
+        """Frames that pass in the time of one while this plate plays."""
+        return self.desk.workspace.plate_look.speed if self.shown else 1.0
 
     def _session_replaced(self) -> None:
         self.eye.forget()

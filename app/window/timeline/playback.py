@@ -19,6 +19,7 @@ class Playback(QObject):
     A frame is set only after everything the one before it caused was dealt with (drawing above all), and it is the one
     whose time it is: a slow picture drops frames and never falls behind. A stroke holds it.
 
+    speed : gives how many frames pass in the time of one; below 1, places between frames are shown.
     changed : it began or ended. reached : frames a second that are really shown.
     """
 
@@ -26,16 +27,17 @@ class Playback(QObject):
 
     def __init__(
         self, desk: Desk, parent: QObject | None = None, clock: Callable[[], float] = time.perf_counter,
+        speed: Callable[[], float] = lambda: 1.0,
     ) -> None:
         super().__init__(parent or desk)
-        self._desk, self._clock = desk, clock
+        self._desk, self._clock, self._speed = desk, clock, speed
         self._timer = QTimer(self, singleShot=True)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
         self._since = 0.0  # when `_from` was shown
         self._from = self._shown = 0.0
         self._last = 0.0
-        self._basis: tuple[float, int, int] = (24.0, 0, 0)
+        self._basis: tuple[float, int, int, float] = (24.0, 0, 0, 1.0)
         self.reached = 0.0
         desk.session_replaced.connect(self.pause)
 
@@ -70,14 +72,17 @@ class Playback(QObject):
     def tick(self) -> None:
         """Show the frame whose time it is, and wait for the next."""
         document, workspace, now = self._desk.document, self._desk.workspace, self._clock()
-        basis = document.fps, document.first_frame, document.last_frame
+        speed = self._speed()
+        basis = document.fps, document.first_frame, document.last_frame, speed
         if self._desk.session.stroking or workspace.frame != self._shown or basis != self._basis:
             self._begin()  # held by a stroke, or somebody moved the frame or the timeline: go on from there
         else:
             passed = int((now - self._since) * document.fps + 1e-6)
             length = document.last_frame - document.first_frame + 1
-            wanted = document.first_frame + (int(self._from) - document.first_frame + passed) % length
-            if wanted != int(self._shown):
+            start = int(self._from) - document.first_frame
+            along = start + passed if speed == 1.0 else _place(start, passed, speed)
+            wanted = min(document.first_frame + along % length, document.last_frame)
+            if wanted != self._shown:
                 self._shown = float(wanted)
                 rate = 1.0 / max(now - self._last, 1e-6)
                 self.reached += (rate - self.reached) * (AVERAGED if self.reached else 1.0)
@@ -90,4 +95,10 @@ class Playback(QObject):
         document = self._desk.document
         self._since = self._last = self._clock()
         self._from = self._shown = self._desk.workspace.frame
-        self._basis = document.fps, document.first_frame, document.last_frame
+        self._basis = document.fps, document.first_frame, document.last_frame, self._speed()
+
+
+def _place(start: int, passed: int, speed: float) -> float:
+    """Where it is after so many pictures; whole frames above a speed of 1."""
+    place = round(start + passed * speed, 6)
+    return float(int(place)) if speed > 1.0 else place

@@ -216,12 +216,14 @@ class NumberField(QLineEdit):
 
 class Timeline(QWidget):
     """Buttons, ruler with the keys below it, range and rate. `playback` plays it; tell :meth:`set_cached` what is
-    cached. `curves` is the button that asks for the curves over it."""
+    cached. `curves` is the button that asks for the curves over it. speed : see :class:`Playback`."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, desk: Desk, parent: QWidget | None = None, speed: Callable[[], float] = lambda: 1.0
+    ) -> None:
         super().__init__(parent)
         self._desk = desk
-        self.playback = Playback(desk, self)
+        self.playback = Playback(desk, self, speed=speed)
         self.ruler = Ruler(desk)
         self.keys = DopeRow(desk.keys, self.ruler.scale)
         self.pose_keys = PoseKeyRow(desk, self.ruler.scale)

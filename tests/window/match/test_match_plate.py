@@ -20,7 +20,7 @@ from app.window.match.plate_panel import PlatePanel
 from app.window.match.track_list import TrackList
 from core.document import Document
 from core.image.plate import Plate
-from core.image.plate_view import view_points
+from core.image.plate_view import plate_camera, view_points
 from core.match.outline import Mask
 from core.match.track import carried_points, keyed_track
 from core.record import freeze
@@ -165,6 +165,44 @@ def test_a_pattern_of_one_edge_is_not_followed_and_it_is_said_why(opened: Opened
     hand.until(lambda: not desk.jobs.running, 240_000)
     assert len(desk.document.tracks[0].frames) == 1
     assert any("one edge only" in words for words in said)
+
+
+def test_a_gap_is_filled_by_flow_and_a_plate_is_slowed_down(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    window, desk = hand.window, hand.window.desk
+    click(hand, START)
+    window.commands.run("match.forward")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    whole = desk.document.tracks[0]
+    kept = np.array([0, 1, 2, 7, 8, 9])
+    part = whole.replace(**{
+        name: freeze(getattr(whole, name)[kept]) for name in ("frames", "points", "covariance", "own", "score")})
+    desk.edit("Gap", edits.put_tracks, (part,))
+    window.commands.run("match.fill")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    (filled,) = desk.document.tracks
+    assert desk.session.history.undo_name == "Fill gaps"
+    assert np.array_equal(filled.frames, whole.frames)
+    assert np.abs(filled.points - whole.points).max() < 0.3
+    desk.set_workspace(plate_look=desk.workspace.plate_look.replace(speed=0.5))
+    window.commands.run("match.slow_motion")
+    hand.until(lambda: not desk.jobs.running, 240_000)
+    film = desk.document.plates[0]
+    first, second = (np.float32(window.match.screen.pixels(film, FIRST + k)) for k in (2, 3))
+    assert window.match.slow.picture(film, FIRST + 2.0) is None
+    made = np.float32(window.match.slow.picture(film, FIRST + 2.5))
+    moved = cv2.warpAffine(first, np.float32([[1, 0, 0.5 * STEP[0]], [0, 1, 0.5 * STEP[1]]]), (WIDTH, HEIGHT))
+    inner = np.s_[10:-10, 10:-10]
+    assert np.abs(made - moved)[inner].mean() < 0.4 * np.abs(0.5 * (first + second) - moved)[inner].mean()
+    eye, at = window.match.eye, np.array([60.0, 40.0])
+    eye.look(plate_camera(at[0], -at[1], eye.size()[1] / 6.0))  # six pixels of the screen for one of the plate
+    window.commands.run("match.hide")
+    desk.set_workspace(frame=FIRST + 2.5)
+    hand.view._pointer = None
+    hand.view.redraw()
+    hand.painted()
+    shown = hand.view.grabFramebuffer().pixelColor(pixel(hand, at))
+    assert np.abs(np.array([shown.red(), shown.green(), shown.blue()]) - made[40, 60]).max() <= 2
 
 
 def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:

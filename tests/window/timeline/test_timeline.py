@@ -204,6 +204,21 @@ def test_playback_shows_the_frame_whose_time_it_is(desk: Desk, qtbot: QtBot) -> 
     assert not playback.playing
 
 
+def test_at_another_speed_places_between_frames_are_played_or_frames_left_out(desk: Desk, qtbot: QtBot) -> None:
+    for speed, places in ((0.5, [1098.0, 1098.5, 1099.0, 1100.0, 1100.0, 1001.0]), (2.0, [1098.0, 1100.0, 1002.0])):
+        clock = Clock()
+        playback = Playback(desk, clock=clock, speed=lambda speed=speed: speed)
+        desk.set_workspace(frame=1098.0)
+        playback.play()
+        seen = []
+        for passed in range(len(places)):
+            clock.now = 100.0 + (passed + (passed > 2)) / 24
+            playback.tick()
+            seen.append(desk.workspace.frame)
+        assert seen == places
+        playback.pause()
+
+
 def test_frames_left_out_are_said_beside_the_rate(
     desk: Desk, timeline: Timeline, monkeypatch: pytest.MonkeyPatch
 ) -> None:
