@@ -15,7 +15,7 @@ from core.evaluator import Evaluator
 from core.feather.attributes import column
 from core.feather.coat.coat import FeatherCoat
 from core.feather.coat.condensed import coat_condensed
-from core.feather.coat.curves import coat_curves, kinds_of
+from core.feather.coat.curves import coat_curves, kinds_of, shaft_looks
 from core.feather.coat.export import crossing_wings, instances, left_crossing, shown_rows, wing_rows
 from core.feather.coat.picture import coat_meshes
 from core.feather.coat.plumage import Laid, Plumage
@@ -26,7 +26,7 @@ from core.formats.usd_feathers import FeatherFrame
 from core.mesh.skin import Skin
 
 Figures = dict[str, Any]
-Form = Literal["instances", "meshes", "shafts", "barbs", "condensed"]
+Form = Literal["instances", "meshes", "shafts", "barbs", "condensed", "nurbs"]
 CURVES: tuple[Form, ...] = ("shafts", "barbs", "condensed")
 EXPORTED = ("age", "spacing", "tract", "length")  # columns every program gets beside places and ids
 LISTED = 100  # crossing pairs named in a report
@@ -73,15 +73,15 @@ def worse(one: Figures, other: Figures) -> Figures:
     }
 
 
-def form_of(each: bool, curves: str | None) -> Form:
-    """What the options ``--meshes`` and ``--curves KIND`` ask for; wrong usage when there is no such kind, or both."""
+def form_of(each: bool, nurbs: bool, curves: str | None) -> Form:
+    """What ``--meshes``, ``--nurbs`` and ``--curves KIND`` ask for; wrong usage when there is no such kind, or two."""
+    if each + nurbs + (curves is not None) > 1:
+        raise typer.BadParameter("choose one of --meshes, --nurbs and --curves")
     if curves is None:
-        return "meshes" if each else "instances"
+        return "meshes" if each else "nurbs" if nurbs else "instances"
     found = next((form for form in CURVES if form == curves), None)
     if found is None:
         raise typer.BadParameter(f"curves are {', '.join(CURVES)}, not {curves!r}", param_hint="--curves")
-    if each:
-        raise typer.BadParameter("choose either --meshes or --curves")
     return found
 
 
@@ -118,7 +118,10 @@ def export_frame(
         left, vanes = left_crossing(laid, evaluator.workers), laid.layered.vanes[rows]
         made = FeatherFrame(frame, laid.skin.points, None, laid.ids[rows], vanes, of_skin, kinds=kinds[rows])
         figures = {}
-    if form == "condensed":
+    if form == "nurbs":
+        radii = [shaft_looks(worn_values(coat, name), vanes.shape[1])[0] for name in names]
+        made = made._replace(radii=np.stack(radii))
+    elif form == "condensed":
         made = made._replace(curves=lambda: coat_condensed(laid, coat, barbs), attributes=attributes)
     elif form in ("shafts", "barbs"):
         made = made._replace(curves=lambda: coat_curves(laid, coat, form == "barbs", barbs), attributes=attributes)

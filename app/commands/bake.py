@@ -42,13 +42,14 @@ def command(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder the files go to; beside the project when not given.", show_default=False)] = None,
     processes: Annotated[int, typer.Option(min=1, max=256, help="Frames baked at once; by default one for each core.")] = os.cpu_count() or 1,
     each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
+    nurbs: Annotated[bool, typer.Option("--nurbs", help="Write every vane as a NURBS patch and the shafts as NURBS curves.")] = False,
     curves: Annotated[str | None, typer.Option(help=f"Write curves for hair renderers: {', '.join(CURVES)}.")] = None,
     barbs: Annotated[int | None, typer.Option(min=1, max=2000, help="Barbs a side at most, wider by what is left out; all when not given.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Bake every frame by itself: no frame reads another, so that any may be baked again, anywhere, in any order."""
     report = Report(as_json)
-    wanted, form = frame_range(frames), form_of(each, curves)
+    wanted, form = frame_range(frames), form_of(each, nurbs, curves)
     assert wanted is not None  # the option is required
     if file.suffix.lower() != ".filo":
         raise UserError(f"{file.name} is no project; save one with feathers as .filo and bake that")

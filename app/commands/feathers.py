@@ -52,6 +52,7 @@ def command(
     wings: Annotated[bool, typer.Option("--wings/--no-wings", help="Give a rig whose joints are called humerus, forearm and hand the feathers of wings and tail, beyond the count.")] = True,
     frames: Annotated[str | None, typer.Option(help="Frames to write, as A-B; the mesh must move.")] = None,
     each: Annotated[bool, typer.Option("--meshes", help="Write every feather's own shape instead of instances.")] = False,
+    nurbs: Annotated[bool, typer.Option("--nurbs", help="Write every vane as a NURBS patch and the shafts as NURBS curves.")] = False,
     curves: Annotated[str | None, typer.Option(help=f"Write curves with widths for hair renderers: {', '.join(CURVES)} (Houdini's).")] = None,
     barbs: Annotated[int | None, typer.Option(min=1, max=2000, help="Barbs a side at most, wider by what is left out; all when not given.")] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of the file where it does not say: m, cm, mm, in, ft.")] = None,
@@ -63,7 +64,7 @@ def command(
     report = Report(as_json)
     if placement not in CHOICES:
         raise typer.BadParameter(f"placement is one of {', '.join(CHOICES)}, not {placement!r}")
-    wanted, form = frame_range(frames), form_of(each, curves)
+    wanted, form = frame_range(frames), form_of(each, nurbs, curves)
     _check(output)
     evaluator = Evaluator()
     with report.working(total=5 + len(output)):

@@ -46,9 +46,9 @@ def write_feather(path: Path, values: NDArray[np.float32], seed: int, level: Lev
 
 
 def _patches_and_curves(stage: Any, values: NDArray[np.float32], seed: int) -> list[Any]:
-    prims = [_patch(stage, "/Feather/Quill", quill(values))]
+    prims = [nurbs_patch(stage, "/Feather/Quill", quill(values))]
     for number, patch in enumerate(vane_patches(values, seed), 1):
-        prims.append(_patch(stage, f"/Feather/Vane_{number}", patch))
+        prims.append(nurbs_patch(stage, f"/Feather/Vane_{number}", patch))
     _color(prims, [_plain(values, "shaftColorRootRed")] + [_plain(values, "colorMiddleRed")] * (len(prims) - 1))
     barbs = expand(values, condense(values[None], np.array([seed])), 0)
     colors = vane_colors(values, np.repeat(barbs.sides, barbs.points.shape[1]), barbs.places.reshape(-1, 2), seed)
@@ -66,7 +66,8 @@ def _patches_and_curves(stage: Any, values: NDArray[np.float32], seed: int) -> l
     return prims
 
 
-def _patch(stage: Any, where: str, patch: Nurbs) -> Any:
+def nurbs_patch(stage: Any, where: str, patch: Nurbs) -> Any:
+    """Define a patch on a stage of OpenUSD; the prim."""
     from pxr import Gf, UsdGeom, Vt
 
     prim = UsdGeom.NurbsPatch.Define(stage, where)

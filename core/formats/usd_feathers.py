@@ -5,6 +5,7 @@ What is written, under the default prim ``/Feathers`` (metres, Y up, extents aut
     /Feathers/<name>               PointInstancer: positions, orientations, scales, protoIndices, ids
     /Feathers/<name>/Prototypes    one Mesh for every quantised shape of every type, feathers of length 1
     /Feathers/<name>               or Mesh: all feathers, with feather_id per face and a GeomSubset of each type
+    /Feathers/<name>/feather_<id>  or NurbsPatch, each a vane, and NurbsCurves, all shafts (``usd_feather_nurbs``)
     /Feathers/<name>/<type>_<k>    or BasisCurves (``usd_feather_curves``): shafts, with barbs, or condensed
     /Feathers/<name>_wings         Mesh: the feathers of wings and tail, each as it is, with feather_id
     /Feathers/mesh                 the animal, moving where it moves
@@ -31,6 +32,7 @@ from core.feather.coat.export import Instances
 from core.feather.look import FeatherLook
 from core.formats.feather_look import usd_material
 from core.formats.usd_feather_curves import clear_curves, write_curves
+from core.formats.usd_feather_nurbs import NurbsFeathers
 from core.mesh.mesh import Mesh
 
 SUFFIXES = (".usd", ".usda", ".usdc")
@@ -41,6 +43,7 @@ class FeatherFrame(NamedTuple):
 
     points : (V, 3) float32, the animal. attributes : primvars of the feathers, (N,) float32 by name.
     wing_ids, wing_vanes : (M,) int32, (M, R, C, 3) float32, feathers of wings, or None; wing_attributes : theirs.
+    radii : (K, R) float32, of shafts by kind, in shaft lengths: vanes, also those of wings, become NURBS; or None.
     kinds, wing_kinds : (N,), (M,) int32, which of the writer's looks each feather has; None for the first one.
     curves : makes the feathers, also those of wings, some at a time; `attributes` then has a number for every row of
         the laid coat.
@@ -58,6 +61,7 @@ class FeatherFrame(NamedTuple):
     kinds: NDArray[np.int32] | None = None
     wing_kinds: NDArray[np.int32] | None = None
     curves: Callable[[], Iterator[FeatherCurves | CondensedFeathers]] | None = None
+    radii: NDArray[np.float32] | None = None
 
 
 class FeatherWriter:
@@ -93,6 +97,7 @@ class FeatherWriter:
         self._looks = list(looks.values())
         self._materials = [usd_material(stage, f"/Feathers/Looks/{_named(kind)}", looks[kind]) for kind in looks]
         self._curves: dict[str, Any] = {}
+        self._nurbs: NurbsFeathers | None = None
         self._mesh = _animal(stage, mesh)
         self._coat: Any = None
         self._wings: Any = None
@@ -109,6 +114,9 @@ class FeatherWriter:
         self._mesh.CreateExtentAttr().Set(_extent(frame.points), time)
         if frame.curves is not None:
             self._write_curves(frame.curves(), frame.attributes, time)
+            return
+        if frame.radii is not None and frame.vanes is not None:
+            self._write_nurbs(frame, frame.vanes, frame.radii, time)
             return
         if frame.instances is not None:
             self._write_instances(frame, frame.instances, time)
@@ -127,7 +135,7 @@ class FeatherWriter:
             self._stage.SetEndTimeCode(last)
         self._layer.Save()
         self._stage = self._mesh = self._coat = self._wings = self._layer = None
-        self._curves = {}
+        self._curves, self._nurbs = {}, None
 
     def _write_instances(self, frame: FeatherFrame, found: Instances, time: Any) -> None:
         from pxr import UsdGeom, UsdShade, Vt
@@ -185,6 +193,25 @@ class FeatherWriter:
                 if subset:
                     subset.GetIndicesAttr().Set(Vt.IntArray.FromNumpy(faces), time)
         return prim
+
+    def _write_nurbs(
+        self, frame: FeatherFrame, vanes: NDArray[np.float32], radii: NDArray[np.float32], time: Any
+    ) -> None:
+        """Feathers of the skin and of wings as NURBS."""
+        if self._nurbs is None:
+            self._nurbs = NurbsFeathers(self._stage, self._place, self._materials, radii)
+        ids, kinds = frame.ids, _of_kind(frame.kinds, len(frame.ids))
+        attributes = {_identifier(name): column for name, column in frame.attributes.items()}
+        if frame.wing_ids is not None and frame.wing_vanes is not None:
+            more = _of_kind(frame.wing_kinds, len(frame.wing_ids))
+            ids, kinds = np.concatenate([ids, frame.wing_ids]), np.concatenate([kinds, more])
+            vanes = np.concatenate([vanes, frame.wing_vanes])
+            attributes = {
+                name: np.concatenate([column, frame.wing_attributes[name]])
+                for name, column in frame.attributes.items() if name in frame.wing_attributes
+            }
+        colors = np.array([look.color for look in self._looks], np.float32)[kinds]
+        self._nurbs.write(ids, kinds, vanes, colors, attributes, time)
 
     def _write_curves(
         self, chunks: Iterator[FeatherCurves | CondensedFeathers], attributes: dict[str, NDArray[np.float32]], time: Any

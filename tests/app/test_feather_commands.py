@@ -10,7 +10,7 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from app import cli
-from app.feather_frames import say_beyond_clips
+from app.feather_frames import CURVES, say_beyond_clips
 from app.report import Report
 from core.document import Document, MeshObject, with_feathers, with_groom
 from core.evaluator import Evaluator
@@ -50,6 +50,31 @@ def test_a_bird_is_dressed_with_exactly_the_count(bird, tmp_path, capsys, count,
     assert len(ids) == len(np.unique(ids)) == count
 
 
+@pytest.mark.parametrize("form", [("--meshes",), ("--nurbs",), *(("--curves", kind) for kind in CURVES)])
+@pytest.mark.parametrize("count", [0, 23])
+def test_every_form_holds_every_feather_in_every_frame(bird, tmp_path, capsys, form, count):
+    out = tmp_path / "coat.usdc"
+    found = told(
+        capsys, "feathers", bird, "-o", out, "--count", count, "--keys", 6, "--frames", "1001-1002", "--barbs", 4,
+        *form)
+    assert (found["feathers"], found["crossings"]) == (count, 0)
+    stage = Usd.Stage.Open(str(out))
+    for frame in (1001.0, 1002.0):
+        ids = []
+        for prim in stage.Traverse():
+            made = UsdGeom.PrimvarsAPI(prim).GetPrimvar("feather_id")
+            if made.IsDefined() and not prim.IsA(UsdGeom.NurbsPatch):
+                ids += list(made.Get(frame) or ())
+        assert len(set(ids)) == count
+
+
+def test_two_forms_at_once_are_wrong_usage(bird, tmp_path, capsys):
+    with pytest.raises(SystemExit) as left:
+        cli.main(["feathers", str(bird), "-o", str(tmp_path / "a.usdc"), "--meshes", "--nurbs"])
+    assert left.value.code == 2
+    assert "choose one of" in capsys.readouterr().err
+
+
 def test_a_project_of_feathers_is_baked_and_published(bird, tmp_path, capsys):
     project = tmp_path / "bird.filo"
     told(capsys, "feathers", bird, "-o", project, "--count", 60, "--keys", 6)
@@ -68,6 +93,15 @@ def test_a_project_of_feathers_is_baked_and_published(bird, tmp_path, capsys):
     first = Usd.Stage.Open(baked["outputs"][0]).ExportToString()
     again = told(capsys, "bake", project, "--frames", "1001", "--processes", 1)
     assert Usd.Stage.Open(again["outputs"][0]).ExportToString() == first
+    pooled = told(
+        capsys, "bake", project, "--frames", "1001-1002", "--processes", 2, "--curves", "barbs", "--barbs", 3,
+        "-o", tmp_path)
+    alone = Usd.Stage.Open(pooled["outputs"][1]).ExportToString()
+    told(
+        capsys, "bake", project, "--frames", "1002", "--processes", 1, "--curves", "barbs", "--barbs", 3,
+        "-o", tmp_path)
+    Usd.Stage.Open(pooled["outputs"][1]).Reload()
+    assert Usd.Stage.Open(pooled["outputs"][1]).ExportToString() == alone
     made = told(capsys, "publish", project, "--to", tmp_path / "shot", "--note", "first look", "--no-picture")
     version = json.loads((Path(made["path"]) / "version.json").read_text())
     assert version["note"] == "first look"

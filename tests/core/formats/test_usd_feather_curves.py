@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdShade
+from scipy.interpolate import BSpline
 
 from app.feather_frames import coat_looks, export_frame
 from core.demo.bird_document import bare_bird_document
@@ -172,6 +173,35 @@ def test_condensed_feathers_expand_to_the_same_barbs(tmp_path, bird):
             assert (primvar(prim, name) >= 0.0).all()
         assert UsdGeom.PrimvarsAPI(prim).GetPrimvar("P_barbl").GetElementSize() == 15
     assert sorted(seen) == sorted(laid.ids[laid.shown].tolist())
+
+
+def test_patches_and_shafts_of_nurbs_go_through_the_laid_vanes(tmp_path, bird):
+    laid = bird[0]
+    stage = opened(tmp_path / "coat.usdc", bird, "nurbs")
+    patches = {
+        UsdGeom.PrimvarsAPI(prim).GetPrimvar("feather_id").Get(): UsdGeom.NurbsPatch(prim)
+        for prim in stage.Traverse() if prim.IsA(UsdGeom.NurbsPatch)
+    }
+    assert sorted(patches) == sorted(laid.ids[laid.shown].tolist())
+    for row in np.flatnonzero(laid.shown)[::7]:
+        patch, vane = patches[int(laid.ids[row])], laid.layered.vanes[row]
+        many = (patch.GetVVertexCountAttr().Get(), patch.GetUVertexCountAttr().Get())
+        points = np.array(patch.GetPointsAttr().Get(), np.float64).reshape(*many, 3)
+        along = BSpline(np.array(patch.GetVKnotsAttr().Get()), points, patch.GetVOrderAttr().Get() - 1, axis=0)
+        across = BSpline(
+            np.array(patch.GetUKnotsAttr().Get()), along(np.linspace(0.0, 1.0, vane.shape[0])),
+            patch.GetUOrderAttr().Get() - 1, axis=1)
+        np.testing.assert_allclose(across(np.linspace(0.0, 1.0, vane.shape[1])), vane, atol=2e-6)
+    (shafts,) = (UsdGeom.NurbsCurves(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.NurbsCurves))
+    ids = primvar(shafts, "feather_id").tolist()
+    many = laid.layered.vanes.shape[1]
+    points = np.array(shafts.GetPointsAttr().Get(), np.float64).reshape(len(ids), many, 3)
+    knots = np.array(shafts.GetKnotsAttr().Get()).reshape(len(ids), -1)
+    for row in np.flatnonzero(laid.shown)[::7]:
+        k = ids.index(int(laid.ids[row]))
+        curve = BSpline(knots[k], points[k], shafts.GetOrderAttr().Get()[k] - 1)
+        wanted = laid.layered.vanes[row][:, laid.layered.vanes.shape[2] // 2]
+        np.testing.assert_allclose(curve(np.linspace(0.0, 1.0, many)), wanted, atol=2e-6)
 
 
 def test_a_feather_bent_by_hand_takes_its_barbs_with_it(bird):
