@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from app.deliver import posed_document
 from app.report import Report
 from core.document import Document, find_mesh, keys_of
 from core.evaluator import Evaluator
@@ -22,7 +24,9 @@ from core.feather.coat.plumage import Laid, Plumage
 from core.feather.coat.worn import parts_of, worn_preset, worn_values
 from core.feather.look import FeatherLook, look_of
 from core.feather.pieces import FeatherMesh
-from core.formats.usd_feathers import FeatherFrame
+from core.formats.atomic import atomic_write
+from core.formats.curve_file import maker
+from core.formats.usd_feathers import FeatherFrame, FeatherWriter
 from core.mesh.skin import Skin
 
 Figures = dict[str, Any]
@@ -140,6 +144,26 @@ def export_frame(
         "feathers": len(rows), "crossings": len(left.first), "skin_hits": len(left.skin), "pairs": left.pairs,
         **figures, "worst": worst[:LISTED],
     }
+
+
+def write_coat(
+    path: Path, document: Document, coat: FeatherCoat, form: Form, evaluator: Evaluator, frame: float | None = None,
+    barbs: int | None = None,
+) -> Figures:
+    """Write a coat of a document to OpenUSD as it lies at a frame (None: at rest); what is told of it."""
+    item, start = find_mesh(document, coat.mesh_id), float(document.first_frame)
+    plumage, keys = Plumage(evaluator), keys_of(document, coat)
+    if frame is None:
+        laid = plumage.at_rest(coat, keys, item.mesh, start)
+    else:
+        skin = posed_document(document, frame, evaluator)[item.id]
+        laid = plumage.at_frame(coat, keys, item.mesh, skin, frame, start)
+    written, figures = export_frame(laid, coat, start if frame is None else frame, form, evaluator, barbs=barbs)
+    with atomic_write(path) as beside:
+        writer = FeatherWriter(beside, coat.name, item.mesh, maker(), coat_looks(coat), False)
+        writer.write(written)
+        writer.close()
+    return figures
 
 
 def _wear(values: NDArray[np.float32]) -> float:

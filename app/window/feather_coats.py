@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
 
 from app.window.ask_text import ask_text
 from app.window.commands import Command, Window
@@ -14,11 +17,13 @@ from app.window.jobs import Asked, Progress
 from app.window.window_commands import shown_panels
 from core.document import MeshObject, feathers_of, find_mesh
 from core.errors import UserError
+from core.evaluator import Evaluator
 from core.feather.coat.coat import FeatherCoat
 from core.feather.presets import bird_names, load_bird
 from tools.scene import active_mesh
 
 if TYPE_CHECKING:
+    from app.feather_frames import Figures, Form
     from core.feather.coat.dress import Dressed
 
 FEATHERS = 4_000  # of a first coat
@@ -217,7 +222,60 @@ def _are_hidden(desk: Desk) -> bool:
     return coat is not None and coat.hidden
 
 
+def _export(form: Form) -> Callable[[Window], None]:
+    """What asks for a file and writes the coat at hand to it, as it lies at the frame that is shown."""
+    def run(window: Window) -> None:
+        from app.window.files.opening import choose_file, filter_of
+
+        desk = window.desk
+        choose_file(
+            window if isinstance(window, QWidget) else None, "Export feathers",
+            [filter_of("OpenUSD", (".usdc", ".usda", ".usd"))],
+            lambda path: desk.attempt(lambda path: export_feathers(desk, path, form), path), ".usdc")
+
+    return run
+
+
+def export_feathers(desk: Desk, path: Path, form: Form) -> None:
+    """Write the coat whose keys are at hand beside the window, as it lies at the frame that is shown."""
+    coat, document, frame = _coat(desk), desk.session.history.current, float(desk.workspace.frame)
+    if coat is None:
+        raise UserError(_needs_feathers(desk) or "There are no feathers.")
+
+    def write(progress: Progress, cancelled: Asked) -> Figures:
+        from app.feather_frames import write_coat  # with every kernel of a coat
+
+        evaluator = Evaluator()
+        try:
+            return write_coat(path, document, coat, form, evaluator, frame)
+        finally:
+            evaluator.close()
+
+    def tell(found: Figures) -> None:
+        left = found["crossings"]
+        desk.said.emit(f"{found['feathers']:,} feathers are in {path}; {left} of their pairs cross.")
+
+    desk.jobs.start(f"Write {path.name}", write, tell)
+
+
+def _export_command(name: str, form: Form, label: str, what: str, words: str) -> Command:
+    return Command(
+        f"feathers.{name}", label, f"Writes the feathers at the frame that is shown to OpenUSD: {what}.",
+        _export(form), "app.feather_frames.write_coat", "file", None, _needs_feathers, icon="export",
+        words=f"write save usd bird plumage renderer {words}")
+
+
+EXPORTS: tuple[Command, ...] = (
+    _export_command("export", "instances", "Export feathers…", "instances of shapes, with materials and ids", "points"),
+    _export_command("export_meshes", "meshes", "Export feathers as meshes…", "every feather in its own shape", "mesh"),
+    _export_command("export_nurbs", "nurbs", "Export feathers as NURBS…", "a patch for every vane", "patches surfaces"),
+    _export_command("export_shafts", "shafts", "Export shafts as curves…", "curves of all shafts, with widths", "hair"),
+    _export_command("export_barbs", "barbs", "Export barbs as curves…", "curves of all shafts and all barbs", "hair"),
+    _export_command(
+        "export_condensed", "condensed", "Export condensed feathers…", "shafts that carry arrays of barbs", "Houdini"),
+)
 FEATHER_COATS: tuple[Command, ...] = (
+    *EXPORTS,
     Command(
         "feathers.dress", "Dress with feathers",
         "Lays a first coat of feathers on the active mesh, with keys that you comb like guides.",

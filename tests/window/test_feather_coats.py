@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Literal, cast
 
 import numpy as np
 import pytest
+from pxr import Usd, UsdGeom
 from pytestqt.qtbot import QtBot
 
 from app.window import feather_coats
@@ -155,3 +157,20 @@ def test_crossings_that_are_left_are_looked_at_one_after_another(opened: Opened,
         camera = desk.workspace.cameras[0]
         pixels = project(camera, lying.laid.layered.vanes[pair].reshape(-1, 3), 400, 300)
         np.testing.assert_allclose(pixels.xy.mean(axis=0), [200.0, 150.0], atol=60.0)
+
+
+@pytest.mark.parametrize("form", ["instances", "nurbs", "barbs"])
+def test_the_coat_at_hand_is_written_beside_the_window(
+    desk: Desk, qtbot: QtBot, tmp_path: Path, form: Literal["instances", "nurbs", "barbs"]
+) -> None:
+    said: list[str] = []
+    desk.said.connect(said.append)
+    path = tmp_path / "coat.usdc"
+    feather_coats.export_feathers(desk, path, form)
+    qtbot.waitUntil(lambda: any(str(path) in words for words in said), timeout=60_000)
+    stage, found = Usd.Stage.Open(str(path)), set[int]()
+    for prim in stage.Traverse():
+        ids = UsdGeom.PrimvarsAPI(prim).GetPrimvar("feather_id")
+        if ids.IsDefined() and not prim.IsA(UsdGeom.NurbsPatch):
+            found |= set(ids.Get())
+    assert len(found) == COUNT
