@@ -39,6 +39,7 @@ from app.window.history_panel import HistoryPanel
 from app.window.hotkeys import Hotkeys
 from app.window.keymap_editor import KeymapEditor
 from app.window.maps_panel import MapsPanel
+from app.window.match.dope_sheet import DopeSheet
 from app.window.match.model_panel import ModelPanel
 from app.window.match.plate_beside import PlateBeside
 from app.window.match.plate_panel import PlatePanel
@@ -78,7 +79,8 @@ from core.workspace import ViewOptions, Workspace
 from tools.session import Session
 
 USUAL_SIZE = (1600, 1000)
-AROUND = ("shelf", "timeline", "curves", "pose_map", "feather", "space", "beside")  # panels that are not in the column
+# panels that are not in the column
+AROUND = ("shelf", "timeline", "curves", "pose_map", "feather", "space", "beside", "dope")
 COLUMN_WIDTH = 26  # of the column at the right, in heights of the text
 
 
@@ -120,6 +122,7 @@ class MainWindow(QMainWindow):
         self.status = StatusLine(self.desk, self.hotkeys)
         self.timeline = Timeline(self.desk, speed=self.match.play_speed)
         self.curves = CurvePanel(self.desk, self.commands, self.hotkeys)
+        self.dope_sheet = DopeSheet(self.desk, self.timeline.ruler)
         self.pose_side = PoseSide(self.desk)
         self.feather_side = FeatherSide(self.desk, self.viewport.draw_beside, FoldMemory(self._folder))
         self.solve_space = SolveSpace(
@@ -128,7 +131,8 @@ class MainWindow(QMainWindow):
         self.plate_beside.set_budget(settings.frames_mb << 20)
         self.panels: dict[str, QWidget] = {
             "shelf": self.shelf, "timeline": self.timeline, "curves": self.curves, "pose_map": self.pose_side,
-            "feather": self.feather_side, "space": self.solve_space, "beside": self.plate_beside}
+            "feather": self.feather_side, "space": self.solve_space, "beside": self.plate_beside,
+            "dope": self.dope_sheet}
         self.column = self._make_column()
         self._console: QDockWidget | None = None
         self._preferences: Preferences | None = None
@@ -208,8 +212,9 @@ class MainWindow(QMainWindow):
         over.setHandleWidth(look_of().grid)
         over.addWidget(upper)
         over.addWidget(self.curves)
-        over.setStretchFactor(0, 1)
-        over.setStretchFactor(1, 0)
+        over.addWidget(self.dope_sheet)
+        for place, share in enumerate((1, 0, 0)):
+            over.setStretchFactor(place, share)
         down.addWidget(over, 1)
         down.addWidget(self.timeline)
         down.addWidget(self.status)

@@ -29,6 +29,7 @@ PANELS = {
     "model": ("Photomodel", "Shows or hides the model of photographs: its points, the worst first, and what is known."),
     "space": ("Solved scene", "Shows or hides the solved camera in space beside the plate, with its path and points."),
     "beside": ("Plate beside", "Shows or hides another plate or photograph beside the one in view, in step with it."),
+    "dope": ("Dope sheet", "Shows or hides all tracks over the timeline: where each is seen, how well, and its keys."),
     "coat": ("Coat", "Shows or hides the settings of the hair grown from the guides."),
     "maps": ("Maps", "Shows or hides the painted maps and the 2-D view of the UVs."),
     "history": ("History", "Shows or hides the list of steps that undo goes through."),
@@ -40,10 +41,10 @@ _GROWN = ("groom", "feather")
 PANEL_CRAFTS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("coat", "maps", "feather"), _GROWN),
     **dict.fromkeys(("controls", "poses", "library", "rig", "pose_map"), ("pose",)),
-    **dict.fromkeys(("tracks", "solve", "plate", "space", "model", "beside"), ("match",)),
+    **dict.fromkeys(("tracks", "solve", "plate", "space", "model", "beside", "dope"), ("match",)),
 }
 LEFT_OUT = {"match": ("scene", "respect")}  # of a craft in which they say nothing
-AT_FIRST_HIDDEN = ("curves", "feather", "space", "beside")
+AT_FIRST_HIDDEN = ("curves", "feather", "space", "beside", "dope")
 PUT_AWAY = "-"  # before the name of a panel in Workspace.panels that was hidden by hand
 TEXT_SIZES = (10, 11, 12, 13, 14, 16, 18, 20)  # pixels
 _SETTINGS = "app.window.settings.save_settings"

@@ -16,8 +16,10 @@ from PySide6.QtWidgets import QInputDialog
 from app.window.commands import Command
 from app.window.match import doors
 from app.window.match.commands import MATCH
+from app.window.match.dope_sheet import tones_of
 from app.window.match.plate_panel import PlatePanel
 from app.window.match.track_list import TrackList
+from app.window.theme import look_of
 from core.document import Document
 from core.image.plate import Plate
 from core.image.plate_view import plate_camera, view_points
@@ -203,6 +205,43 @@ def test_a_gap_is_filled_by_flow_and_a_plate_is_slowed_down(opened: Opened, plat
     hand.painted()
     shown = hand.view.grabFramebuffer().pixelColor(pixel(hand, at))
     assert np.abs(np.array([shown.red(), shown.green(), shown.blue()]) - made[40, 60]).max() <= 2
+
+
+def test_the_dope_sheet_stands_over_the_timeline_takes_tracks_and_scrubs(opened: Opened, plate: Path) -> None:
+    hand = opened_plate(opened, plate)
+    window, desk = hand.window, hand.window.desk
+    rows = np.column_stack((np.arange(FIRST, FIRST + COUNT), np.full((COUNT, 2), 50.0)))
+    first, second = (keyed_track(n, f"t{n}", rows[n:], 1) for n in (1, 2))
+    poor = second.covariance.copy()
+    poor[4:] = 1.0, 0.0, 1.0
+    desk.edit("Tracks", edits.put_tracks, (first, second.replace(covariance=freeze(poor))))
+    assert list(tones_of(desk.document.tracks[1])) == [0] * 4 + [2] * 4
+    window.commands.run("window.dope")
+    hand.rest()
+    sheet = window.dope_sheet
+    assert sheet.isVisible()
+    ruler = window.timeline.ruler
+    for frame in (FIRST, FIRST + 6):  # what stands over each other is the same frame
+        over = sheet.viewport().mapToGlobal(QPoint(round(sheet.x_of(frame)), 0)).x()
+        assert abs(over - ruler.mapToGlobal(QPoint(round(ruler.x_of(frame)), 0)).x()) <= 1
+    high = sheet._row(look_of())
+    at = QPoint(round(sheet.x_of(FIRST + 6)), round(1.5 * high))
+    QTest.mouseClick(sheet.viewport(), LEFT, NONE, at)
+    assert (desk.document.track_selection, desk.workspace.frame) == ((2,), FIRST + 6)
+    QTest.mouseClick(sheet.viewport(), LEFT, Qt.KeyboardModifier.ShiftModifier, QPoint(at.x(), round(0.5 * high)))
+    assert desk.document.track_selection == (2, 1)
+    QTest.mousePress(sheet.viewport(), LEFT, NONE, at)
+    QTest.mouseMove(sheet.viewport(), QPoint(round(sheet.x_of(FIRST + 3)), at.y()))
+    QTest.mouseRelease(sheet.viewport(), LEFT, NONE, QPoint(round(sheet.x_of(FIRST + 3)), at.y()))
+    assert desk.workspace.frame == FIRST + 3
+    assert "a key" in sheet._words(desk.document.tracks[0], at)
+    picture = sheet.viewport().grab().toImage()
+    ratio = picture.devicePixelRatio()
+    for frame, tone in ((FIRST + 2, "cached"), (FIRST + 8, "trouble")):
+        x = 0.5 * (sheet.x_of(frame) + sheet.x_of(frame + 1))
+        shown = picture.pixelColor(round(x * ratio), round(1.5 * high * ratio))
+        wanted = look_of().theme.colour(tone)
+        assert max(abs(shown.red() - wanted.red()), abs(shown.green() - wanted.green())) < 40
 
 
 def test_picking_holds_at_every_zoom(opened: Opened, plate: Path) -> None:
