@@ -28,6 +28,8 @@ READ = (*usd_solve.SUFFIXES, alembic_solve.SUFFIX, ".nk", ".chan", ".out", ".jso
 
 def check_writable(path: Path) -> None:
     """Refuse a name no shot is written as."""
+    if path.suffix.lower() == ".bin" and path.name.lower() not in COLMAP:
+        raise UserError(f"{path.name}: a camera is written as .bin for COLMAP alone; give the name cameras.bin.")
     if path.name.lower() not in WRITTEN and path.suffix.lower() not in WRITTEN:
         raise UserError(f"{path.name}: a camera is written as {', '.join(WRITTEN)}; choose one of these")
 
@@ -66,6 +68,8 @@ def read_shot(path: Path, size: tuple[int, int] | None) -> Shot:
         return alembic_solve.read_shot(path)
     if path.name.lower() in COLMAP:
         return shot_models.read_colmap(path)
+    if suffix == ".bin":
+        raise UserError(f"{path.name}: of .bin files only COLMAP's models are read; choose the cameras.bin of one.")
     if path.stat().st_size > shot_models.LARGEST:
         raise UserError(f"{path.name} is larger than {shot_models.LARGEST >> 30} GB.")
     if suffix == ".json":

@@ -327,8 +327,8 @@ def without_options(note: str) -> str:
 
 
 def filter_of(words: str, suffixes: Sequence[str]) -> str:
-    """A filter of a file dialog: "Meshes (*.obj *.ply)"."""
-    return f"{words} ({' '.join('*' + suffix for suffix in suffixes)})"
+    """A filter of a file dialog: "Meshes (*.obj *.ply)"; what begins without a dot is a whole name."""
+    return f"{words} ({' '.join('*' * suffix.startswith('.') + suffix for suffix in suffixes)})"
 
 
 def open_filters() -> list[str]:

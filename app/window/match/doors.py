@@ -33,7 +33,11 @@ if TYPE_CHECKING:
     from core.match.lens_maps import Canvas
 
 Work = Callable[[Progress, Asked], Any]
-CAMERAS = (".usda", ".usdc", ".abc", ".nk", ".chan", ".ma", ".py", ".txt", ".bin")
+CAMERAS = {  # program -> the names of its files; all that core.formats.shot_file.WRITTEN has
+    "USD": (".usda", ".usdc", ".usd"), "Alembic": (".abc",), "Nuke": (".nk", ".chan"), "Maya": (".ma",),
+    "Blender": (".py",), "COLMAP": ("cameras.txt", "cameras.bin"), "Bundler": (".out",),
+    "OpenSfM": ("reconstruction.json",), "Lens of 3DEqualizer": (".txt",),
+}
 NO_PLATE = "There is no plate yet: open one from the File menu, or drop its folder on the window."
 WAIT = 0.05  # s before a scene that is still being made is asked for again
 
@@ -139,7 +143,9 @@ class MatchDoors(QObject):
     def ask_export_camera(self) -> None:
         """Let the artist name a file for the solved camera; its suffix says for which program."""
         self._solved()
-        choose_file(self._parent, "Export camera", [filter_of("Cameras", CAMERAS)],
+        everything = tuple(name for names in CAMERAS.values() for name in names)
+        kinds = [filter_of("Cameras", everything), *(filter_of(words, names) for words, names in CAMERAS.items())]
+        choose_file(self._parent, "Export camera", kinds,
                     lambda path: self._desk.attempt(self.export_camera, path), save=".usda")
 
     def export_camera(self, path: Path) -> None:

@@ -253,3 +253,12 @@ def test_broken_files_are_refused_in_words(name, data, tmp_path):
     (tmp_path / name).write_bytes(data)
     with pytest.raises(UserError):
         read_shot(tmp_path / name, SIZE)
+
+
+@pytest.mark.parametrize("name", ["images.bin", "points3D.bin", "shot.bin"])
+def test_other_files_of_bin_are_refused_at_once_with_the_name_to_choose(name, tmp_path):
+    with pytest.raises(UserError, match=r"cameras\.bin"):
+        check_writable(tmp_path / name)
+    (tmp_path / name).write_bytes(bytes(64))
+    with pytest.raises(UserError, match=r"cameras\.bin"):
+        read_shot(tmp_path / name, None)
