@@ -87,6 +87,7 @@ class Tracking:
         starts = self._starts(direction)
         finding = self._auto if direction > 0 else 0
         groups: dict[tuple[object, ...], _Group] = {}  # tracks of the same settings
+        shape: tuple[int, ...] | None = None  # of the frames; one of another size shows another picture
         for n, frame in enumerate(self._frames[::direction]):
             alive = any(group.runs.alive.any() for group in groups.values())
             if not (alive or frame in starts or finding):
@@ -94,7 +95,8 @@ class Tracking:
                     return
                 continue
             image = self._read(frame)
-            if image is None:
+            shape = shape if shape is not None or image is None else image.shape
+            if image is None or image.shape != shape:
                 for group in groups.values():
                     group.runs.miss()
                 continue

@@ -96,6 +96,16 @@ def test_a_missing_frame_is_left_out():
         assert set(range(12)) - set(track.frames) == {5}
 
 
+def test_a_frame_of_another_size_is_left_out():
+    def images(k):
+        image = frame(k)
+        return np.ascontiguousarray(image[::2, ::2]) if k == 4 else image
+
+    for track in followed(range(9), keyed(POINTS), images):
+        assert list(track.frames) == [0, 1, 2, 3, 5, 6, 7, 8]
+        assert np.abs(errors(track)).max() < 0.15
+
+
 def test_after_a_cut_tracks_end_instead_of_jumping():
     other = np.random.default_rng(3)
 
