@@ -143,8 +143,8 @@ def pictures_of_steps(steps: Sequence[Any], size: tuple[int, int], picture_of: C
         hand.window.close_unasked()
 
 
-def match_window(plate: Path, name: str) -> None:
-    """A plate in the window with automatic tracks, one of those that go farthest selected."""
+def match_window(plate: Path, name: str, *panels: str) -> None:
+    """A plate in the window with automatic tracks, one of those that go farthest selected, and more panels."""
     ensure_display()  # before anything of Qt is made
     from app.window.screenshot import window_image
     from tests.window.alone import hand_at
@@ -160,6 +160,8 @@ def match_window(plate: Path, name: str) -> None:
         hand.finish()
         hand.window.commands.run("match.features")
         hand.until(lambda: not desk.jobs.running, 240_000)
+        for panel in panels:
+            hand.window.toggle_panel(panel)
         frame = desk.document.first_frame + 2
         desk.set_workspace(frame=float(frame))
         seen = [t for t in desk.document.tracks if frame in t.frames and frame not in t.keys[:, 0]]
@@ -247,7 +249,7 @@ def main() -> None:
         return
     from docs.first_track import SINTEL
 
-    match_window(Path(data) / SINTEL, "match-window.jpg")
+    match_window(Path(data) / SINTEL, "match-window.jpg", "dope")
     match_window(Path(data) / TUM, "match-tum.jpg")
     first_track()
     feather_window(Path(data) / PENGUIN, evaluator)
